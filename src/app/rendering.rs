@@ -10,6 +10,9 @@ use super::worker::{Activity, Snapshot, Worker};
 use crate::error::Result;
 use crate::render::gpu::{DeviceChoice, Gpu, RayChoice};
 
+/// Samples a pixel after which a picture without light is called dark.
+const MIN_SAMPLES: u32 = 4;
+
 /// The render thread and its results.
 pub(super) struct Rendering {
     /// The curves of the error.
@@ -22,6 +25,8 @@ pub(super) struct Rendering {
     pub(super) snapshot: Option<Arc<Snapshot>>,
     /// How much faster than the plain method that was made, where both are rendered.
     pub(super) speed_up: Option<SpeedUp>,
+    /// The geometry of which it was last said that no light gets in.
+    dark: Option<Arc<()>>,
 }
 
 impl Rendering {
@@ -37,6 +42,7 @@ impl Rendering {
             worker: Worker::start(wake, gpu, screen)?,
             snapshot: None,
             speed_up: None,
+            dark: None,
         })
     }
 
@@ -49,6 +55,23 @@ impl Rendering {
             self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
             self.snapshot = Some(snapshot);
         }
+    }
+
+    /// Whether no light reaches what the camera sees, if that has not been said of this scene.
+    pub(super) fn turns_out_dark(&mut self) -> bool {
+        let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole()) else {
+            return false;
+        };
+        let (main, geometry) = (&snapshot.main, snapshot.request.world.geometry());
+        let is_new = self.dark.as_ref().is_none_or(|said| !Arc::ptr_eq(said, geometry));
+        let is_dark = main.on_device.is_none()
+            && main.film.min_samples() >= MIN_SAMPLES
+            && main.film.is_dark();
+        let turns_out = is_new && is_dark;
+        if turns_out {
+            self.dark = Some(Arc::clone(geometry));
+        }
+        turns_out
     }
 
     /// Whether the picture that was asked for last is done.

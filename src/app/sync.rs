@@ -18,6 +18,10 @@ use crate::error::Error;
 use crate::render::gpu::DeviceChoice;
 use crate::sources;
 
+/// What helps where a room has no opening.
+const DARK: &str = "No light reaches what the camera sees: no path has found the sky or a lamp. Hide a wall or an opaque \
+                    pane (click it, then Hide under MATERIAL), add a lamp, or look from elsewhere";
+
 impl App {
     /// Takes what the threads have ready.
     pub(super) fn collect(&mut self, context: &egui::Context) {
@@ -47,6 +51,9 @@ impl App {
         }
         self.take_render_failures();
         self.rendering.collect();
+        if self.rendering.turns_out_dark() {
+            self.messages.notice(DARK);
+        }
         self.display.collect();
         if let Some(factor) = self.display.change_of_aspect() {
             self.interface.follow_shape(factor);

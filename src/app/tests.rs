@@ -236,6 +236,20 @@ fn a_scene_is_read_again_while_a_material_of_it_changes() {
 }
 
 #[test]
+fn it_is_said_once_that_no_light_gets_in() {
+    let Some(mut studio) = studio("open") else { return };
+    let said = |studio: &mut Studio, intensity: f32| {
+        let document = &mut studio.app.edited.document;
+        (document.intensity, document.stop.samples) = (intensity, Some(4));
+        studio.settle().expect("rendered");
+        studio.frame().expect("drawn");
+        let list = studio.app.messages.list();
+        list.iter().filter(|message| message.sentence.starts_with("No light")).count()
+    };
+    assert_eq!([1.0, 0.0, 1.0, 0.0].map(|intensity| said(&mut studio, intensity)), [0, 1, 1, 1]);
+}
+
+#[test]
 fn lamps_are_scaled_apart_from_the_map() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lit.gltf");
