@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use gltf::json;
-use json::accessor::{ComponentType, GenericComponentType};
+use json::accessor::{ComponentType, GenericComponentType, Type};
 use json::validation::Checked;
 use serde_json::Value;
 
+use super::accessor::Elements;
 use super::buffers::File;
 use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use super::pose::{self, MESH, Nodes};
@@ -79,10 +80,12 @@ pub(super) fn bounds(
     Ok([low, high])
 }
 
-/// Bounds of a primitive's positions in its own space, if the file has them.
+/// Bounds of a primitive's positions in its own space: as the file has them or, where it breaks the rule that it must,
+/// as they are.
 fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3; 2]> {
     let position = Checked::Valid(json::mesh::Semantic::Positions);
-    let accessor = file.document.accessors.get(*primitive.attributes.get(&position)?).ok()?;
+    let number = *primitive.attributes.get(&position)?;
+    let accessor = file.document.accessors.get(number).ok()?;
     let Checked::Valid(GenericComponentType(component)) = accessor.component_type else {
         return None;
     };
@@ -99,7 +102,13 @@ fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3;
             value.as_ref()?.as_array()?.iter().filter_map(Value::as_f64).collect();
         Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?) / unit)
     };
-    Some([corner(&accessor.min)?, corner(&accessor.max)?])
+    if let Some(bounds) = corner(&accessor.min).zip(corner(&accessor.max)) {
+        return Some(bounds.into());
+    }
+    let positions = Elements::open(file, number, &[Type::Vec3]).ok()?;
+    let points = (0..positions.count).map(|i| Vec3::from(positions.floats::<3>(i)).as_dvec3());
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    Some(points.fold(none, |[low, high], point| [low.min(point), high.max(point)]))
 }
 
 /// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.
