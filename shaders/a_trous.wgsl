@@ -165,7 +165,22 @@ fn survey(@builtin(global_invocation_id) id: vec3u) {
     guides[index].slope = slope;
 }
 
-// The variance of a pixel that shows the map alone, if there is little; otherwise negative.
+// Variance over squared luminance of a pixel; of single samples neighbours tell.
+fn relative_variance(place: vec2i) -> f32 {
+    let here = light[index_of(place)];
+    let own = compared_luminance(here.xyz);
+    if here.w >= 0.0 {
+        return here.w / max(own * own, TINY);
+    }
+    let is_last = place.x + 1 == i32(settings.size.x);
+    let next = index_of(place + vec2i(select(1, -min(place.x, 1), is_last), 0));
+    let other = compared_luminance(light[next].xyz);
+    let off = (own - other) / max(own + other, TINY);
+    return 2.0 * off * off;
+}
+
+// The variance of a pixel that shows the map alone; negative where it does not, and where one
+// sample does not tell.
 fn variance_of_map(centre: vec2i) -> f32 {
     let index = index_of(centre);
     if guides[index].coverage > 0.0 {
@@ -179,20 +194,10 @@ fn variance_of_map(centre: vec2i) -> f32 {
     for (var dy = -REACH; dy <= REACH; dy++) {
         for (var dx = -REACH; dx <= REACH; dx++) {
             let place = centre + vec2i(dx, dy);
-            if !is_inside(place) {
+            if !is_inside(place) || guides[index_of(place)].coverage > 0.0 {
                 continue;
             }
-            let other = index_of(place);
-            if guides[other].coverage > 0.0 {
-                continue;
-            }
-            var variance = light[other].w;
-            if variance < 0.0 {
-                let is_last = place.x + 1 == i32(settings.size.x);
-                let next = index_of(place + vec2i(select(1, -min(place.x, 1), is_last), 0));
-                let off = compared_luminance(light[other].xyz) - compared_luminance(light[next].xyz);
-                variance = 0.5 * off * off;
-            }
+            var variance = relative_variance(place);
             count++;
             for (var i = 0; i < QUARTER; i++) {
                 let kept = smallest[i];
@@ -204,7 +209,9 @@ fn variance_of_map(centre: vec2i) -> f32 {
     let freedom = f32(max(counts[index].x, 2u) - 1u);
     let variance = smallest[(count - 1) / 4] * (1.0 + 8.85 * pow(freedom, -1.6));
     let brightness = compared_luminance(light[index].xyz);
-    return select(-1.0, variance, sqrt(variance) <= MAX_MAP_NOISE * brightness);
+    let most = MAX_MAP_NOISE * MAX_MAP_NOISE;
+    let is_told = counts[index].x > 1u || variance <= most;
+    return select(-1.0, min(variance, most) * brightness * brightness, is_told);
 }
 
 @compute @workgroup_size(8, 8)

@@ -32,7 +32,7 @@ pub(crate) const SINGLE: f32 = 3.0;
 /// How much less likely one sample more makes it that all of a pixel's are off its surroundings by chance: two
 /// that are bright by chance, and agree, seem sure.
 pub(crate) const FEWER: f32 = 0.2;
-/// Noise of the map, relative to it, up to which that tells its error: in thick fog and behind glass there is more.
+/// Most noise of what is seen of the map, relative to it: a fifth of a lamp is not mistaken for the sky beside it.
 pub(crate) const MAX_MAP_NOISE: f32 = 0.2;
 /// Pixels around one that are kept to tell the quarter with the smallest errors.
 const QUARTER: usize = 7;
@@ -107,7 +107,7 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
     support
 }
 
-/// The variance of a pixel that shows the map alone, if there is little: what three quarters of the pixels around
+/// The variance of a pixel that shows the map alone: relative to its light what three quarters of the pixels around
 /// exceed, times how much more it is on average. A sun or a lamp, of which edges alone have errors, so keeps its place.
 fn variance_of_map(light: &Light, guides: &Guides, index: usize, samples: u32) -> Option<f32> {
     let size = [guides.width, guides.height];
@@ -115,16 +115,22 @@ fn variance_of_map(light: &Light, guides: &Guides, index: usize, samples: u32) -
     if !shows_map(index) {
         return None;
     }
+    let relative = |other: usize| {
+        let (own, variance) = (light.luminance[other], light.variance[other]);
+        if variance >= 0.0 {
+            return variance / (own * own).max(f32::MIN_POSITIVE);
+        }
+        // Of single samples neighbours tell.
+        let column = other % size[0];
+        let next = if column + 1 < size[0] { other + 1 } else { other - column.min(1) };
+        let next = light.luminance[next];
+        let off = (own - next) / (own + next).max(f32::MIN_POSITIVE);
+        2.0 * off * off
+    };
     let mut smallest = [f32::INFINITY; QUARTER];
     let mut count = 0;
     for (other, _) in around(index, size, REACH as usize).filter(|(other, _)| shows_map(*other)) {
-        let mut variance = light.variance[other];
-        if variance < 0.0 {
-            // Of single samples neighbours tell.
-            let column = other % size[0];
-            let next = if column + 1 < size[0] { other + 1 } else { other - column.min(1) };
-            variance = 0.5 * (light.luminance[other] - light.luminance[next]).powi(2);
-        }
+        let mut variance = relative(other);
         count += 1;
         for kept in &mut smallest {
             if variance < *kept {
@@ -135,8 +141,10 @@ fn variance_of_map(light: &Light, guides: &Guides, index: usize, samples: u32) -
     // Quartiles of chi-square distributions, fitted.
     let freedom = samples.max(2) as f32 - 1.0;
     let variance = smallest[(count - 1) / 4] * (1.0 + 8.85 * freedom.powf(-1.6));
-    let is_little = variance.sqrt() <= MAX_MAP_NOISE * light.luminance[index];
-    is_little.then_some(variance)
+    let luminance = light.luminance[index];
+    // Neighbours that differ by more may be in fog: of that one sample says nothing.
+    let is_told = samples > 1 || variance <= MAX_MAP_NOISE * MAX_MAP_NOISE;
+    is_told.then_some(variance.min(MAX_MAP_NOISE * MAX_MAP_NOISE) * luminance * luminance)
 }
 
 impl Around {
