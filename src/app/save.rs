@@ -121,7 +121,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
         ("env_sun", json!(document.sun)),
-        ("lamps", json!(document.lamps)),
+        ("lamps_factor", json!(document.lamps)),
         ("materials", json!(edits(picture))),
     ]);
     settings

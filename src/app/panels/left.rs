@@ -93,7 +93,9 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
     if let Some(scene) = sources.scene {
         let (low, high) = scene.world.bvh.bounds();
         let triangles = theme::count(scene.world.scene.shown_triangles());
-        let text = format!("{triangles} triangles, {}", theme::extent(high - low));
+        let frame = scene.world.scene.frame;
+        let size = (high - low).to_array().map(|length| frame.length_in_file(length));
+        let text = format!("{triangles} triangles, {}", theme::extent(size.into()));
         ui.label(theme::quiet(text)).on_hover_text(format!(
             "{} materials, {} textures; BVH {}",
             scene.world.scene.materials.len(),

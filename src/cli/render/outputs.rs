@@ -125,6 +125,7 @@ pub(super) fn settings(
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("env_sun", serde_json::json!(arguments.env_sun)),
+        ("lamps", serde_json::json!(arguments.of_scene.options().lamps)),
         ("materials", serde_json::json!(arguments.of_scene.edits())),
     ]);
     settings
