@@ -43,6 +43,13 @@ impl Frame {
         if frame.scale.is_finite() && frame.center.is_finite() { frame } else { Self::default() }
     }
 
+    /// Whether f32 is as exact in both.
+    pub(in crate::scene) fn is_like(self, other: Self) -> bool {
+        let distance = (self.center - other.center).abs().max_element() * self.scale;
+        let ratio = (self.scale / other.scale).log2().abs();
+        distance <= MAX_DISTANCE * EXTENT && ratio <= 3.0
+    }
+
     /// Whether scene and file have the same coordinates.
     pub fn is_identity(self) -> bool {
         self == Self::default()

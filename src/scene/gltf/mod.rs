@@ -57,7 +57,7 @@ use geometry::Needs;
 use limits::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use materials::Materials;
 use part::{Part, Tally};
-use placement::{Placement, bounds, drop_copies, placements};
+use placement::{Placement, bounds, box_around, drop_copies, placements};
 use pose::Nodes;
 use primitive::Mesh;
 use share::Sharing;
@@ -103,7 +103,29 @@ pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<S
     Ok(scene)
 }
 
+/// Reads a file in the frame that suits the bounds it states and, where they are not those of what it shows, again.
 fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
+    let scene = read_in(bytes, base_dir, options, None)?;
+    let frame = scene.frame;
+    if frame.is_identity() {
+        return Ok(scene);
+    }
+    let points = scene.hull_points(|_| true).map(|point| frame.point_in_file(point));
+    let suiting = Frame::suiting(box_around(points));
+    if suiting.is_like(frame) {
+        return Ok(scene);
+    }
+    drop(scene);
+    read_in(bytes, base_dir, options, Some(suiting))
+}
+
+/// Reads a file in a frame; `None` is the one that suits the bounds it states.
+fn read_in(
+    bytes: &[u8],
+    base_dir: Option<&Path>,
+    options: &SceneOptions,
+    frame: Option<Frame>,
+) -> Fallible<Scene> {
     let mut notices = Notices::default();
     let (text, binary) = document::split(bytes)?;
     // Names in other encodings are no reason to refuse a file.
@@ -115,7 +137,11 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     let document = &file.document;
     let mut nodes = Nodes::new(document, DAffine3::IDENTITY, &mut notices)?;
     let mut placements = placements(&file, &nodes)?;
-    let frame = Frame::suiting(bounds(&file, &nodes, &placements)?);
+    let is_known = frame.is_some();
+    let frame = match frame {
+        Some(frame) => frame,
+        None => Frame::suiting(bounds(&file, &nodes, &placements)?),
+    };
     if !frame.is_identity() {
         // Again, from where f32 is exact enough; what there was to be said has been said.
         nodes = Nodes::new(document, frame.transform(), &mut Notices::default())?;
@@ -155,6 +181,9 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     sharing.finish(&mut scene)?;
     let materials = reading.materials;
     materials.tell_of_sheets(&mut notices);
+    if scene.triangles.is_empty() && !is_known && !frame.is_identity() {
+        return read_in(bytes, base_dir, options, Some(Frame::default()));
+    }
     if scene.triangles.is_empty() {
         let reasons = repairs(&tally).join(", ");
         let reasons = if reasons.is_empty() { reasons } else { format!(" ({reasons})") };

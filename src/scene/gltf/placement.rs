@@ -47,37 +47,32 @@ pub(super) fn placements(
     Ok(placements)
 }
 
-/// Low and high corner of a box around all that is shown, by what the file says of its positions; infinite the wrong
-/// way round where it says nothing.
+/// [`box_around`] all that is shown, by what the file says of its positions.
 pub(super) fn bounds(
     file: &File<'_>,
     nodes: &Nodes,
     placements: &BTreeMap<u32, Vec<Placement>>,
 ) -> Fallible<[DVec3; 2]> {
-    let [mut low, mut high] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let mut corners = Vec::new();
     for (&number, placements) in placements {
         let mesh: Mesh = file.document.meshes.get_as(json::Index::new(number))?;
         let boxes: Vec<[DVec3; 2]> =
             mesh.primitives().filter_map(|primitive| own_box(file, &primitive.ok()?)).collect();
+        let around = box_around(boxes.into_iter().flatten());
         for placement in placements {
             // What is wrong with a skin is said where its mesh is read.
             let skin = placement.skin;
             let joints = skin.and_then(|skin| pose::joint_transforms(file, nodes, skin).ok());
-            let transforms = joints.unwrap_or_else(|| placement.instances.clone());
-            for (transform, sides) in
-                transforms.iter().flat_map(|it| boxes.iter().map(move |sides| (it, sides)))
-            {
-                for corner in 0..8 {
-                    let at = |axis: usize| sides[corner >> axis & 1][axis];
-                    let point = transform.transform_point3(DVec3::new(at(0), at(1), at(2)));
-                    if point.is_finite() {
-                        (low, high) = (low.min(point), high.max(point));
-                    }
-                }
-            }
+            let transforms = joints.as_ref().unwrap_or(&placement.instances).iter();
+            corners.extend(transforms.flat_map(|transform| {
+                (0..8).map(move |corner| {
+                    let at = |axis: usize| around[corner >> axis & 1][axis];
+                    transform.transform_point3(DVec3::new(at(0), at(1), at(2)))
+                })
+            }));
         }
     }
-    Ok([low, high])
+    Ok(box_around(corners.into_iter()))
 }
 
 /// Bounds of a primitive's positions in its own space: as the file has them or, where it breaks the rule that it must,
@@ -107,8 +102,15 @@ fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3;
     }
     let positions = Elements::open(file, number, &[Type::Vec3]).ok()?;
     let points = (0..positions.count).map(|i| Vec3::from(positions.floats::<3>(i)).as_dvec3());
+    Some(box_around(points))
+}
+
+/// Low and high corner of a box around points, but for those that are not finite; infinite the wrong way round without
+/// any.
+pub(super) fn box_around(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    Some(points.fold(none, |[low, high], point| [low.min(point), high.max(point)]))
+    let points = points.filter(|point| point.is_finite());
+    points.fold(none, |[low, high], point| [low.min(point), high.max(point)])
 }
 
 /// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.

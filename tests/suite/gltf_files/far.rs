@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use lightgrid::scene::{Medium, Projection, PunctualKind, Scene};
 
-use super::builder::square;
+use super::builder::{ONE_MESH, square};
 
 /// Squares ten metres wide, a lamp, a camera and fog below a node that places and scales all of it.
 fn scene(center: DVec3, scale: f64) -> Scene {
@@ -95,5 +95,27 @@ fn what_is_rendered_lies_where_the_file_says() {
         let tint = |scene: &Scene| scene.materials.last().expect("a sheet").base_color;
         let expected = tint(&near).powf(scale as f32);
         assert!((tint(&scene) - expected).abs().max_element() < 1e-4, "{what}");
+    }
+}
+
+/// A frame is found by what a file states of its positions, which may be wrong.
+#[test]
+fn bounds_that_are_not_those_of_the_positions_change_nothing() {
+    for bound in ["3.4e38", "1e9", "1e-9", "0"] {
+        let mut builder = square();
+        let stated =
+            format!(r#","min":[-{bound},-{bound},-{bound}],"max":[{bound},{bound},{bound}]}}"#);
+        builder.accessors[0] = builder.accessors[0].replacen('}', &stated, 1);
+        let scene = builder.load(ONE_MESH);
+        assert!(scene.frame.is_identity(), "{bound}");
+        assert_eq!((scene.positions[2], scene.shown_triangles()), (Vec3::new(1.0, 1.0, 0.0), 2));
+        // Those of a scene that is far away, too.
+        let far = builder.load(
+            r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+            "nodes":[{"mesh":0,"translation":[500000,0,0]}]"#,
+        );
+        let corner = far.frame.point_in_file(far.positions[2]);
+        assert!(corner.abs_diff_eq(DVec3::new(500_001.0, 1.0, 0.0), 1e-3), "{bound}: {corner}");
+        assert!(!far.frame.is_identity() || bound == "0", "{bound}");
     }
 }
