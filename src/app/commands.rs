@@ -56,6 +56,8 @@ pub enum Command {
     ToggleZoom,
     /// Let the window fill the screen, or no longer.
     ToggleFullScreen,
+    /// Show the overlay after the present one (+1) or before it (-1).
+    StepOverlay(isize),
     /// Show or hide the developer's panel.
     ToggleDeveloper,
     /// Show or hide the list of keys.
@@ -79,7 +81,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 21] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 23] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -91,6 +93,8 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 21] = [
     (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
     (plain(Key::G), "CPU or GPU", Command::ToggleDevice),
     (plain(Key::N), "Denoise on or off", Command::ToggleDenoise),
+    (plain(Key::CloseBracket), "Next overlay", Command::StepOverlay(1)),
+    (plain(Key::OpenBracket), "Previous overlay", Command::StepOverlay(-1)),
     (plain(Key::H), "Hide or show the panels", Command::TogglePanels),
     (plain(Key::F11), "Full screen on or off", Command::ToggleFullScreen),
     (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),

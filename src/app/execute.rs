@@ -12,6 +12,7 @@ use super::document::{Document, Viewpoint};
 use super::interface::{Chosen, Purpose, Tab};
 use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
+use super::overlays::Overlay;
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
 use super::sync::stay_in_scene;
@@ -103,7 +104,15 @@ impl App {
                 *device = if is_gpu { DeviceChoice::Cpu } else { DeviceChoice::Gpu };
             }
             Command::ToggleDenoise => document.look.denoise = !document.look.denoise,
-            Command::TogglePanels => interface.panels = !interface.panels,
+            Command::TogglePanels => {
+                interface.panels = !interface.panels;
+                if !interface.panels {
+                    self.messages.notice("H shows the panels again");
+                }
+            }
+            Command::StepOverlay(step) => {
+                interface.overlay = Overlay::beside(interface.overlay, step);
+            }
             Command::ToggleDeveloper => interface.toggle_developer(),
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
             Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),

@@ -61,6 +61,15 @@ impl Overlay {
         Self::Depth,
     ];
 
+    /// The one so many places after another in the list, which begins and ends with none.
+    pub fn beside(overlay: Option<Self>, step: isize) -> Option<Self> {
+        let place = overlay.and_then(|own| Self::ALL.iter().position(|other| *other == own));
+        let count = Self::ALL.len() as isize + 1;
+        let place = place.map_or(0, |place| place as isize + 1) + step;
+        let place = usize::try_from(place.rem_euclid(count) - 1).ok()?;
+        Self::ALL.get(place).copied()
+    }
+
     /// What to call it.
     pub fn title(self) -> &'static str {
         match self {
@@ -146,5 +155,24 @@ impl Overlay {
     /// Whether it shows light, which is developed.
     pub fn is_developed(self) -> bool {
         self == Self::CacheRadiance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_go_through_all_overlays_and_none() {
+        for step in [1, -1] {
+            let mut seen = vec![None];
+            loop {
+                match Overlay::beside(*seen.last().expect("there is one"), step) {
+                    None => break,
+                    overlay => seen.push(overlay),
+                }
+            }
+            assert_eq!(seen.len(), Overlay::ALL.len() + 1);
+        }
     }
 }
