@@ -175,7 +175,7 @@ pub(super) fn finish(scene: &mut Scene) {
 }
 
 /// Beyond this many metres nothing can be computed in f32: squares of distances would overflow.
-const FARTHEST: f32 = 1e18;
+pub(super) const FARTHEST: f32 = 1e18;
 
 /// Whether a position is finite and then some.
 pub(super) fn is_near(position: Vec3) -> bool {

@@ -9,6 +9,7 @@ use json::validation::Checked;
 use serde_json::Value;
 
 use super::accessor::Elements;
+use super::bake::FARTHEST;
 use super::buffers::File;
 use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use super::pose::{self, MESH, Nodes};
@@ -105,11 +106,11 @@ fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3;
     Some(box_around(points))
 }
 
-/// Low and high corner of a box around points, but for those that are not finite; infinite the wrong way round without
-/// any.
+/// Low and high corner of a box around points, but for those that are no number or too far away; infinite the wrong
+/// way round without any.
 pub(super) fn box_around(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let points = points.filter(|point| point.is_finite());
+    let points = points.filter(|point| point.abs().cmple(DVec3::splat(FARTHEST.into())).all());
     points.fold(none, |[low, high], point| [low.min(point), high.max(point)])
 }
 
