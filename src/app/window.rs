@@ -205,12 +205,14 @@ impl Runner {
         let [width, height] = start.settings.window_size;
         let largest = event_loop.primary_monitor().map_or([width, height], |monitor| {
             let size = monitor.size().to_logical::<f32>(monitor.scale_factor());
-            // Less what a desktop takes for titles and its bar.
-            [size.width, size.height - 90.0]
+            [size.width, size.height]
         });
+        // A desktop knows what its bar and titles leave of the screen.
+        let fills_screen = width >= largest[0] || height >= largest[1];
         let (width, height) = (width.min(largest[0]), height.min(largest[1]));
         let attributes = Window::default_attributes()
             .with_title("lightgrid")
+            .with_maximized(fills_screen)
             .with_min_inner_size(LogicalSize::new(720.0, 480.0))
             .with_inner_size(LogicalSize::new(width.max(720.0), height.max(480.0)));
         // By that a desktop finds its icon.
