@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, Context, Frame, Grid, Margin, RichText, ScrollArea, Ui, Vec2, Window};
 
-use crate::app::commands::{GESTURES, SHORTCUTS};
+use crate::app::commands::{Command, GESTURES, SHORTCUTS};
 use crate::app::interface::Interface;
 use crate::app::theme;
 
@@ -43,14 +43,20 @@ pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
 fn keys(ui: &mut Ui) {
     let context = ui.ctx().clone();
     let line = |(keys, what, _): &(_, &'static str, _)| (context.format_shortcut(keys), *what);
-    list(ui, "keys", SHORTCUTS.iter().map(line));
+    // Those two are named together.
+    let is_alone = |(_, _, command): &&(_, _, Command)| !matches!(command, Command::StepOverlay(_));
+    list(ui, "keys", SHORTCUTS.iter().filter(is_alone).map(line));
 }
 
 fn gestures(ui: &mut Ui) {
     let gestures = GESTURES.iter().map(|(how, what)| (theme::keys(how), *what));
     list(ui, "gestures", gestures);
     ui.add_space(10.0);
-    let more = [("? or F1", "This sheet"), ("Ctrl+C", "Copy the picture")];
+    let more = [
+        ("[ and ]", "Previous and next overlay"),
+        ("? or F1", "This sheet"),
+        ("Ctrl+C", "Copy the picture"),
+    ];
     list(ui, "more", more.into_iter().map(|(keys, what)| (theme::keys(keys), what)));
 }
 

@@ -76,8 +76,8 @@ pub(super) fn bounds(
     Ok(box_around(corners.into_iter()))
 }
 
-/// Bounds of a primitive's positions in its own space: as the file has them or, where it breaks the rule that it must,
-/// as they are.
+/// Bounds of a primitive's positions in its own space: as the file has them or, where it has none that can be, as they
+/// are.
 fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3; 2]> {
     let position = Checked::Valid(json::mesh::Semantic::Positions);
     let number = *primitive.attributes.get(&position)?;
@@ -96,7 +96,8 @@ fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3;
     let corner = |value: &Option<Value>| -> Option<DVec3> {
         let numbers: Vec<f64> =
             value.as_ref()?.as_array()?.iter().filter_map(Value::as_f64).collect();
-        Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?) / unit)
+        let corner = DVec3::from(<[f64; 3]>::try_from(numbers).ok()?) / unit;
+        is_near(corner).then_some(corner)
     };
     if let Some(bounds) = corner(&accessor.min).zip(corner(&accessor.max)) {
         return Some(bounds.into());
@@ -106,11 +107,16 @@ fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3;
     Some(box_around(points))
 }
 
+/// Whether a point is a number, and not so far away that what is there is left out.
+fn is_near(point: DVec3) -> bool {
+    point.abs().cmple(DVec3::splat(FARTHEST.into())).all()
+}
+
 /// Low and high corner of a box around points, but for those that are no number or too far away; infinite the wrong
 /// way round without any.
 pub(super) fn box_around(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let points = points.filter(|point| point.abs().cmple(DVec3::splat(FARTHEST.into())).all());
+    let points = points.filter(|point| is_near(*point));
     points.fold(none, |[low, high], point| [low.min(point), high.max(point)])
 }
 
