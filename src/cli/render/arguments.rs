@@ -342,11 +342,11 @@ impl RenderArguments {
         let cleared = *fog == Some(Vec3::ZERO) && fog_absorption.is_none();
         Some(Medium {
             scattering: fog.map_or(of_scene.scattering, |_| asked.scattering),
-            absorption: fog_absorption.map(|_| asked.absorption).unwrap_or(if cleared {
-                Vec3::ZERO
-            } else {
-                of_scene.absorption
-            }),
+            absorption: match fog_absorption {
+                Some(_) => asked.absorption,
+                None if cleared => Vec3::ZERO,
+                None => of_scene.absorption,
+            },
             anisotropy: fog_anisotropy.unwrap_or(of_scene.anisotropy),
             bounds: asked.bounds.or(of_scene.bounds),
         })
