@@ -22,9 +22,9 @@ pub enum AlphaMode {
 /// A texture with the coordinates it is read at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureRef {
-    /// Index into [`Scene::textures`].
+    /// Index into [`Scene::textures`](crate::scene::Scene::textures).
     pub texture: u32,
-    /// Which of [`Scene::uvs`].
+    /// Which of [`Scene::uvs`](crate::scene::Scene::uvs).
     pub uv_set: u8,
     /// `KHR_texture_transform`, texture coordinates from mesh coordinates.
     pub transform: Affine2,
@@ -123,7 +123,7 @@ pub struct Material {
     pub attenuation_distance: f32,
     /// Scattering coefficient per metre inside the body, linear RGB, not negative.
     pub scattering: Vec3,
-    /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`].
+    /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`](crate::scene::Medium::anisotropy).
     pub scatter_anisotropy: f32,
     /// `KHR_materials_anisotropy` strength in `[0,1]`: how much wider reflections are along the
     /// direction below than `roughness` says; 1 is as wide as roughness 1.
@@ -284,7 +284,7 @@ pub enum Wrap {
 /// An image and how it is sampled (level 0 only: a path tracer filters by sampling).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Texture {
-    /// Index into [`Scene::images`].
+    /// Index into [`Scene::images`](crate::scene::Scene::images).
     pub image: u32,
     /// Along u.
     pub wrap_u: Wrap,
