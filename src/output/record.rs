@@ -15,7 +15,7 @@ use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::GpuFigures;
 use crate::render::{Figures, View};
-use crate::scene::Projection;
+use crate::scene::{Projection, in_digits};
 
 /// Seconds before the session starts.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -162,11 +162,6 @@ pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
         ("background", json!(view.background)),
         ("seed", json!(view.seed)),
     ]
-}
-
-/// A number with the digits that an f32 has.
-fn in_digits(x: f32) -> f64 {
-    x.to_string().parse().unwrap_or(f64::NAN)
 }
 
 /// Pretty JSON of anything serialisable.

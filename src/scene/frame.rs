@@ -109,7 +109,7 @@ impl Frame {
 }
 
 /// The shortest decimal number that rounds to this one.
-fn in_digits(x: f32) -> f64 {
+pub(crate) fn in_digits(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::NAN)
 }
 

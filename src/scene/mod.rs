@@ -24,6 +24,7 @@ pub mod texture;
 pub use camera::{Camera, CameraPlace, Projection};
 pub use contents::Scene;
 pub use frame::Frame;
+pub(crate) use frame::in_digits;
 pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use light::{PunctualKind, PunctualLight};
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};

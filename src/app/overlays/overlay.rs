@@ -61,7 +61,7 @@ impl Overlay {
         Self::Depth,
     ];
 
-    /// The one so many places after another in the list, which begins and ends with none.
+    /// The overlay `step` places after this one in [`Self::ALL`]; no overlay comes before the first and after the last.
     pub fn beside(overlay: Option<Self>, step: isize) -> Option<Self> {
         let place = overlay.and_then(|own| Self::ALL.iter().position(|other| *other == own));
         let count = Self::ALL.len() as isize + 1;
