@@ -284,6 +284,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     var rgb = vec3f();
     var variance = 0.0;
     var total = 0.0;
+    var squares = 0.0;
     for (var dy = -2; dy <= 2; dy++) {
         for (var dx = -2; dx <= 2; dx++) {
             let offset = vec2i(dx, dy) * i32(settings.step);
@@ -304,10 +305,13 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             rgb += there.xyz * weight;
             variance += there.w * weight * weight;
             total += weight;
+            squares += weight * weight;
         }
     }
     // The centre always counts, so the total is not zero.
-    result[index] = vec4f(rgb / total, variance / (total * total));
+    let independent = variance / (total * total);
+    let shared_noise = inverseSqrt(sqrt(squares) / total);
+    result[index] = vec4f(rgb / total, independent * select(shared_noise, 1.0, settings.step == 1u));
 }
 
 // A pixel of those that tell another's light.
@@ -436,7 +440,7 @@ fn dress(@builtin(global_invocation_id) id: vec3u) {
                 }
             }
         }
-        shown = mix(own, around.xyz / around.w, 1.0 / f32(max(counts[index].x, 1u)));
+        shown = mix(own, around.xyz / around.w, min(CHANCE_SAMPLES / f32(max(counts[index].x, 1u)), 1.0));
     }
     result[index] = vec4f(shown, 0.0);
     result_counts[index] = vec4u(min(counts[index].x, 1u), 0u, 0u, 0u);

@@ -185,6 +185,7 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
     // Until the end the sum of weights.
     let total = &mut *row.luminance;
     let mut weights = vec![0.0; width];
+    let mut squares = vec![0.0; width];
     for [dx, dy] in square(2) {
         let kernel = KERNEL[dx.unsigned_abs()] * KERNEL[dy.unsigned_abs()];
         let offset = [dx * step, dy * step];
@@ -201,14 +202,17 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
         let variance = &light.variance[there..there + count];
         let [to_r, to_g, to_b] = row.rgb.each_mut().map(|plane| &mut plane[columns.clone()]);
         let to_variance = &mut row.variance[columns.clone()];
+        let squares = &mut squares[columns.clone()];
         let total = &mut total[columns];
         for i in 0..count {
             let weight = kernel * weights[i];
+            let square = weight * weight;
             to_r[i] += weight * r[i];
             to_g[i] += weight * g[i];
             to_b[i] += weight * b[i];
-            to_variance[i] += weight * weight * variance[i];
+            to_variance[i] += square * variance[i];
             total[i] += weight;
+            squares[i] += square;
         }
     }
     // The centre always counts, so the total is not zero.
@@ -218,9 +222,18 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
             plane[x] *= scale;
             plane[x]
         });
-        row.variance[x] *= scale * scale;
+        let shared = if step == 1 { 1.0 } else { shared_noise(squares[x] * scale * scale) };
+        row.variance[x] *= scale * scale * shared;
         row.luminance[x] = compared_luminance(Vec3::from(rgb));
     }
+}
+
+/// By what the variance of a mean is more than that of independent taps, from the sum of squared weights over the
+/// squared sum: after the first pass taps have pixels in common. All weights of the spline have 0.075, and leave a
+/// quarter of the variance instead; the fourth root, which goes less far, gave the lowest FLIP.
+#[inline(always)]
+fn shared_noise(ratio: f32) -> f32 {
+    1.0 / ratio.sqrt().sqrt()
 }
 
 #[cfg(test)]

@@ -18,6 +18,9 @@ use crate::image::Image;
 pub(crate) const MIN_ALIKE: f32 = 8.0;
 /// With fewer than this it is on an edge.
 pub(crate) const WHOLE: f32 = 18.0;
+/// Up to so many samples a pixel on an edge shows the mean of those around it; with more that counts less in
+/// proportion.
+pub(crate) const CHANCE_SAMPLES: f32 = 1.5;
 /// Columns and rows around a pixel that tell its light.
 const REACH: usize = 2;
 /// Error of all light relative to it and to what is told: what is bright counts for what is dark no more than in
@@ -59,7 +62,7 @@ pub(super) fn mended(
             let weight = ((2 - column) * (2 - row)) as f32;
             (sum, total) = (sum + filled[other] * weight, total + weight);
         }
-        let share = 1.0 / samples.count(index).max(1) as f32;
+        let share = (CHANCE_SAMPLES / samples.count(index).max(1) as f32).min(1.0);
         own.lerp(sum / total, share).to_array()
     };
     let pixels = (0..filled.len()).into_par_iter().map(smooth).collect();

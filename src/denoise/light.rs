@@ -8,7 +8,7 @@ use super::samples::Samples;
 use crate::color::luminance;
 
 /// Luminances have nothing in common that are so many of their standard errors apart.
-pub(crate) const ERRORS_TOLERATED: f32 = 4.0;
+pub(crate) const ERRORS_TOLERATED: f32 = 3.5;
 /// The same of no variance: not zero.
 pub(crate) const MIN_VARIANCE: f32 = 1e-12;
 /// No variance and no luminance that is compared is larger, so that sums of them are finite.

@@ -8,6 +8,7 @@ use crate::render::gpu::{DeviceFilm, Gpu, constants};
 constants::constants! {
     ALBEDO_TOLERANCE: guides::ALBEDO_TOLERANCE,
     CHANCES: guides::CHANCES,
+    CHANCE_SAMPLES: edges::CHANCE_SAMPLES,
     COVERAGE_TOLERANCE: guides::COVERAGE_TOLERANCE,
     DEPTH_GROWTH: guides::DEPTH_GROWTH,
     DEPTH_SCALE: edges::DEPTH_SCALE,
