@@ -32,5 +32,5 @@ fn main() -> Result<()> {
     let (mut driver, never) = (Driver::new(session, rule), AtomicBool::new(false));
     while !driver.step(&never)? {}
     let film = driver.session.film();
-    write_picture(Path::new(picture), &PictureOptions::default(), film, Vec::new())
+    write_picture(Path::new(picture), &PictureOptions::default(), film.into(), Vec::new())
 }

@@ -8,11 +8,11 @@ use serde_json::json;
 use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
 use super::tasks::{TaskResult, Tasks};
-use super::worker::Snapshot;
+use super::worker::{Origin, Snapshot};
 use crate::error::{Notices, Result};
 use crate::image::check_writable;
 use crate::output::record::{Phases, Record, settings_of};
-use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
+use crate::output::{Exposure, Films, LayerName, PictureOptions, write_picture};
 
 /// What a picture is written from.
 pub(super) struct Picture {
@@ -83,6 +83,7 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
         environment: &snapshot.request.environment,
         film: &snapshot.main.film,
         figures: &snapshot.main.figures,
+        cached_seconds: snapshot.cached_seconds,
         gpu: snapshot.main.gpu.as_deref().cloned(),
         phases: &Phases {
             load_scene_seconds: picture.scene.seconds[0],
@@ -101,7 +102,10 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
         white_balance: document.look.white_balance,
         layers: vec![LayerName::All],
     };
-    write_picture(path, &options, record.film, record.metadata())
+    // As it is shown. In linear light it is exact.
+    let cached = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.origin == Origin::Cache);
+    let cached = cached.map(|backdrop| (&*backdrop.film, backdrop.worth));
+    write_picture(path, &options, Films { film: record.film, cached }, record.metadata())
 }
 
 /// Changes to materials, as `--material` reads them.

@@ -75,8 +75,9 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     }
     let Some(film) = joined else { return Err(Error::new("there is no part to be merged")) };
     let metadata = metadata(&parts, &film);
-    let write =
-        |path: &PathBuf| picture.write(path, &film, &metadata).map(|()| say_written(path)).err();
+    let write = |path: &PathBuf| {
+        picture.write(path, (&film).into(), &metadata).map(|()| say_written(path)).err()
+    };
     Error::all(outputs.iter().filter_map(write).collect())
 }
 

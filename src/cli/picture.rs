@@ -6,7 +6,7 @@ use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
 use crate::image::{is_same_file, name_of_process};
-use crate::output::{self, Exposure, LayerName, PictureOptions};
+use crate::output::{self, Exposure, Films, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
 use crate::tone::{KELVIN, TINT, ToneCurve, WhiteBalance};
@@ -182,16 +182,16 @@ impl PictureArguments {
     pub(super) fn write(
         &self,
         path: &Path,
-        film: &Film,
+        films: Films<'_>,
         metadata: &[(String, String)],
     ) -> Result<()> {
-        let options = self.options(film);
-        let Err(failure) = output::write_picture(path, &options, film, metadata.to_vec()) else {
+        let options = self.options(films.film);
+        let Err(failure) = output::write_picture(path, &options, films, metadata.to_vec()) else {
             return Ok(());
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", name_of_process()));
-        Err(match output::write_picture(&rescued, &options, film, metadata.to_vec()) {
+        Err(match output::write_picture(&rescued, &options, films, metadata.to_vec()) {
             Ok(()) => {
                 Error::new(format!("{failure}; the picture is kept as {}", rescued.display()))
             }

@@ -1,6 +1,7 @@
 //! `lightgrid render`.
 
 mod arguments;
+mod beside;
 mod frames;
 mod outputs;
 mod render_job;
@@ -29,6 +30,7 @@ use crate::render::{Driver, Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
+use beside::Beside;
 use frames::{Frames, Reel};
 use render_job::RenderJob;
 
@@ -151,11 +153,15 @@ impl Job<'_> {
         let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
         let uploaded = self.uploaded.as_ref();
+        let mut beside = Beside::new(arguments, world, environment, &view);
+        if known.is_some() {
+            beside.give_up();
+        }
         let session =
             device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
         let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
-        let record = self.record(arguments, &driver.session, (&nothing, &not_yet), &notices);
+        let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), &notices);
         assignment.set_metadata(record.metadata());
         let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
@@ -163,15 +169,22 @@ impl Job<'_> {
             let taken_up = driver.session.continue_learning(counted);
             cpu.goes_on(&mut driver.session, taken_up).map(|_| ())
         });
-        let outcome = begun
-            .and_then(|()| work(&mut driver, &mut assignment, &self.interrupt, progress, &mut cpu));
+        let outcome = begun.and_then(|()| {
+            let pictures = (&mut driver, &mut beside);
+            work(pictures, &mut assignment, &self.interrupt, progress, &mut cpu)
+        });
         progress.finish();
         if !driver.has_samples() {
             return outcome.map(|()| Vec::new());
         }
         drop(spare);
         let film = driver.film();
-        let remarks = output::remarks(&film, environment);
+        let cached = beside.film(driver.session.samples());
+        let mut remarks = output::remarks(&film, environment);
+        remarks.extend(cached.map(|(film, _)| {
+            let samples = film.min_samples();
+            format!("{samples} samples of cached light help to denoise it (--gi exact: none)")
+        }));
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
         let (asked, mut arguments) = (arguments, Cow::Borrowed(arguments));
@@ -180,8 +193,9 @@ impl Job<'_> {
             arguments.to_mut().picture.take_exposure(&film, asked.pictures());
         }
         let figures = driver.session.figures();
-        let record = self.record(&arguments, &driver.session, (&film, &figures), &notices);
-        let mut failures = outputs::write(&arguments, &assignment, &driver, &record);
+        let done = (&*film, &figures, beside.seconds);
+        let record = self.record(&arguments, &driver.session, done, &notices);
+        let mut failures = outputs::write(&arguments, &assignment, &driver, &record, cached);
         // Another device may have taken over.
         assignment.set_metadata(record.metadata());
         failures.extend(assignment.keep(&driver).err());
@@ -202,7 +216,7 @@ impl Job<'_> {
         &'r self,
         arguments: &'r RenderArguments,
         session: &Session<'_>,
-        (film, figures): (&'r Film, &'r Figures),
+        (film, figures, cached_seconds): (&'r Film, &'r Figures, f64),
         notices: &'r Notices,
     ) -> Record<'r> {
         Record {
@@ -212,6 +226,7 @@ impl Job<'_> {
             environment: self.environment,
             film,
             figures,
+            cached_seconds,
             gpu: session.gpu_figures(),
             phases: &self.phases,
             notices,
@@ -344,8 +359,8 @@ impl TakeOver<'_> {
 
 /// Runs the session until a rule or the user says stop. When the seconds are over, the pass under way ends
 /// with what it has.
-fn work(
-    driver: &mut Driver<'_>,
+fn work<'a>(
+    (driver, beside): (&mut Driver<'a>, &mut Beside<'a>),
     assignment: &mut RenderJob,
     interrupt: &Interrupt,
     progress: &Progress,
@@ -354,6 +369,9 @@ fn work(
     let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
         progress.show(&driver.session, &driver.rule);
+        if beside.advance(driver, interrupt.asked())? {
+            continue;
+        }
         let step = assignment.step(driver, interrupt, &alarm, cpu.notices);
         if cpu.goes_on(&mut driver.session, step)? == Some(true) {
             return Ok(());

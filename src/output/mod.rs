@@ -54,6 +54,22 @@ impl Exposure {
     }
 }
 
+/// A film, and one of the same view and size by cached light: what each of its samples counts beside one of the film's
+/// own in what is denoised.
+#[derive(Debug, Clone, Copy)]
+pub struct Films<'a> {
+    /// What was rendered.
+    pub film: &'a Film,
+    /// What helps to denoise it.
+    pub cached: Option<(&'a Film, f32)>,
+}
+
+impl<'a> From<&'a Film> for Films<'a> {
+    fn from(film: &'a Film) -> Self {
+        Self { film, cached: None }
+    }
+}
+
 /// How a picture is written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureOptions {
@@ -137,10 +153,11 @@ const BLACK_SHARE: f64 = 2e-6;
 pub fn write_picture(
     path: &Path,
     options: &PictureOptions,
-    film: &Film,
+    films: Films<'_>,
     mut metadata: Vec<(String, String)>,
 ) -> Result<()> {
     check_extension(path)?;
+    let film = films.film;
     if holds_layers(path) {
         let whole = film.without_gaps();
         let (image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
@@ -151,7 +168,7 @@ pub fn write_picture(
         let picture = ExrPicture { image: &image, layers, metadata: &metadata, preview: None };
         return write_exr(path, picture);
     }
-    let image = balanced(options, film)?;
+    let image = balanced(options, films)?;
     let stops = options.exposure.of(film, &image);
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
     if options.white_balance != WhiteBalance::default() {
@@ -160,6 +177,10 @@ pub fn write_picture(
     }
     if let Some(filter) = options.filter_of(film) {
         metadata.push(("lightgrid.denoiser".to_owned(), filter.name().to_owned()));
+        if let Some((cached, _)) = films.cached {
+            let samples = cached.min_samples().to_string();
+            metadata.push(("lightgrid.cached_samples_per_pixel".to_owned(), samples));
+        }
     }
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
     let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
@@ -176,15 +197,17 @@ pub fn write_picture(
 /// If its noise cannot be taken out.
 pub fn exposure_of(options: &PictureOptions, film: &Film) -> Result<Exposure> {
     Ok(match options.exposure {
-        Exposure::Auto => Exposure::Stops(options.exposure.of(film, &balanced(options, film)?)),
+        Exposure::Auto => {
+            Exposure::Stops(options.exposure.of(film, &balanced(options, film.into())?))
+        }
         Exposure::Stops(stops) => Exposure::Stops(stops),
     })
 }
 
 /// The film's picture under the light that looks white, without noise if that is asked for.
-fn balanced(options: &PictureOptions, film: &Film) -> Result<Image> {
+fn balanced(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
     let image = match (options.filter_of(film), options.denoiser) {
-        (Some(filter), _) => filter.denoise(&film.without_gaps(), None)?,
+        (Some(filter), _) => filter.denoise(&film.without_gaps(), cached)?,
         (None, Some(_)) => blend(film, None),
         (None, None) => film.without_gaps().image(),
     };

@@ -44,6 +44,8 @@ pub struct Record<'a> {
     pub film: &'a Film,
     /// What was done for it.
     pub figures: &'a Figures,
+    /// Seconds that a picture by cached light has taken beside it.
+    pub cached_seconds: f64,
     /// The device, if it was not the CPU.
     pub gpu: Option<GpuFigures>,
     /// What was done before.
@@ -62,6 +64,10 @@ impl Record<'_> {
         self.gpu.as_ref().map_or("CPU", |gpu| &gpu.adapter.name)
     }
 
+    fn seconds(&self) -> f64 {
+        self.figures.elapsed_seconds() + self.cached_seconds
+    }
+
     /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
     pub fn metadata(&self) -> Vec<(String, String)> {
         let film = self.film;
@@ -73,7 +79,7 @@ impl Record<'_> {
             ("lightgrid.device".to_owned(), self.device().to_owned()),
         ];
         if self.with_times {
-            let seconds = format!("{:.3}", self.figures.elapsed_seconds());
+            let seconds = format!("{:.3}", self.seconds());
             pairs.push(("lightgrid.seconds".to_owned(), seconds));
         }
         // A prefix keeps clear of the names that OpenEXR reserves.
@@ -103,7 +109,8 @@ impl Record<'_> {
             "invalid_samples": film.invalid_samples(),
             "phases": self.phases,
             "session": figures,
-            "seconds": self.figures.elapsed_seconds(),
+            "cached_seconds": self.cached_seconds,
+            "seconds": self.seconds(),
             "rays_per_sample": figures.rays as f64 / figures.samples.max(1) as f64,
             "rays_per_second": figures.rays as f64 / figures.render_seconds.max(1e-9),
             "memory": {

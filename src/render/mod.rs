@@ -1,5 +1,6 @@
 //! Rendering: what is wanted ([`View`]), who does it ([`Session`]), what comes of it ([`film::Film`]).
 
+pub(crate) mod cached_picture;
 mod cpu;
 mod devices;
 mod driver;

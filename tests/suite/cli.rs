@@ -332,6 +332,55 @@ fn a_filter_for_pictures_that_are_not_written_changes_nothing() {
     assert!(a == b);
 }
 
+/// Red, green and blue of an 8-bit picture without alpha.
+fn read_rgb(path: &Path) -> Vec<u8> {
+    let file = std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+    assert_eq!(reader.info().color_type, png::ColorType::Rgb);
+    let mut bytes = vec![0; reader.output_buffer_size().expect("small")];
+    reader.next_frame(&mut bytes).expect("pixels");
+    bytes
+}
+
+#[test]
+fn a_denoised_room_is_cleaner_for_cached_light_beside_its_samples() {
+    let bench = Bench::new();
+    let says = |scene: &str, rest: &str| {
+        let fixed = "--size 96x64 --device cpu --exposure 6.4 --denoise a-trous --reproducible";
+        let output = bench.run(&format!("render {scene} {fixed} {rest}"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stderr).contains("samples of cached light")
+    };
+    assert!(says("office", "--spp 2 -o beside.png -o beside.exr"));
+    assert!(!says("office", "--spp 2 --gi exact -o exact.png -o exact.exr"));
+    let files = ["beside", "exact"].map(|name| {
+        let of = |kind: &str| fs::read(bench.path(&format!("{name}.{kind}"))).expect("written");
+        [of("png"), of("exr")]
+    });
+    assert!(files[0][1] == files[1][1], "linear pictures have exact samples alone");
+    let names_it = |png: &[u8]| {
+        let words = b"lightgrid.cached_samples_per_pixel\x0010";
+        png.windows(words.len()).any(|bytes| bytes == words)
+    };
+    assert!(names_it(&files[0][0]) && !names_it(&files[1][0]));
+    assert!(says("office", "--spp 2 --threads 1 -o again.png"));
+    assert!(fs::read(bench.path("again.png")).expect("written") == files[0][0]);
+
+    assert!(!says("office", "--spp 256 -o reference.png"), "there are enough of its own");
+    let reference = read_rgb(&bench.path("reference.png"));
+    let [beside, exact] = ["beside.png", "exact.png"].map(|name| {
+        let levels = read_rgb(&bench.path(name));
+        let pairs = levels.iter().zip(&reference);
+        pairs.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>()
+    });
+    assert!(beside < 0.6 * exact, "squared error {} of without", beside / exact);
+
+    for rest in ["--spp 1 --part 1/1 -o a.part", "--spp 1 --sampling plain -o a.png"] {
+        assert!(!says("office", rest), "{rest}");
+    }
+    assert!(!says("exterior", "--spp 1 -o a.png"), "outside it gains nothing");
+}
+
 #[test]
 fn a_black_picture_is_remarked() {
     let output = Bench::new().render("-o a.png --env-intensity 0");

@@ -4,11 +4,11 @@ use std::borrow::Cow;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-use super::cached::{self, CachedPicture};
 use super::earlier::EarlierFilm;
 use super::request::Request;
 use super::sessions::SLICE;
 use super::snapshot::{Activity, Backdrop, Origin, SessionSnapshot};
+use crate::render::cached_picture::{self, CachedPicture};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Session, View};
@@ -67,7 +67,7 @@ impl Preview {
 
     /// Whether the film from before says so much that no cached light is needed beside it.
     pub(super) fn is_rich(&self) -> bool {
-        let enough = 2.0 / 3.0 * cached::SAMPLES as f32;
+        let enough = 2.0 / 3.0 * cached_picture::SAMPLES as f32;
         self.earlier.as_ref().is_some_and(|earlier| earlier.is_resized_worth(enough))
     }
 
@@ -218,7 +218,7 @@ impl Preview {
         let cached = self.cached_film(cached, 3 * seen / 2).filter(|_| request.wants_cached);
         let shown = match cached {
             Some((of, film)) => {
-                let worth = cached::worth(samples);
+                let worth = cached_picture::worth(samples);
                 Some(Backdrop { film, samples: of, worth, origin: Origin::Cache })
             }
             None => earlier,

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::cached::CachedPicture;
 use super::request::Request;
 use super::snapshot::Point;
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
+use crate::render::cached_picture::CachedPicture;
 use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.

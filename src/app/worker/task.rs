@@ -4,7 +4,6 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::cached::{CachedPicture, worth};
 use super::inspection::Inspection;
 use super::preview::{MAIN, MAX_GAP, PLAIN, Preview, gap_after};
 use super::request::Request;
@@ -13,6 +12,7 @@ use super::sessions::Sessions;
 use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
+use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
@@ -27,6 +27,8 @@ pub(super) struct PictureTask<'a> {
     inspection: Inspection,
     /// What learning has counted, once it has ended.
     counters: Option<Arc<LearningGrid>>,
+    /// Whether a cached picture would help.
+    suits_cached: bool,
     /// Seconds spent on the cached picture.
     cached_seconds: f64,
     /// When what was published last, and when there may be something new.
@@ -75,8 +77,10 @@ impl<'s> Pictures<'s> {
 
 impl<'a> PictureTask<'a> {
     pub(super) fn new(sessions: Sessions<'a>, preview: &'a mut Preview) -> Self {
-        preview.begin(&sessions.watch.request);
+        let request = &sessions.watch.request;
+        preview.begin(request);
         Self {
+            suits_cached: !request.moving && suits(&request.world, &request.view),
             sessions,
             preview,
             inspection: Inspection::default(),
@@ -327,9 +331,10 @@ impl<'a> PictureTask<'a> {
     }
 
     /// Whether light from a radiance cache can be shown beside what there is, if it is asked for: not where a real
-    /// GPU has many samples in a moment, nor where pictures are compared.
+    /// GPU has many samples in a moment, nor where pictures are compared, and outside only for its own sake.
     fn may_want_cached(&self, main: &Session<'_>) -> bool {
-        !self.request().split
+        (self.suits_cached || self.request().inspects_cache)
+            && !self.request().split
             && !self.sessions.device.is_quick(self.request())
             && worth(main.samples()) > 0.0
     }

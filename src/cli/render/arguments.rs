@@ -128,15 +128,10 @@ pub(in crate::cli) struct RenderArguments {
         help_heading = "Light"
     )]
     pub(super) sharing: Sharing,
-    /// What becomes of light that has met several surfaces.
-    #[arg(
-        long,
-        default_value = "exact",
-        value_enum,
-        value_name = "exact|cached",
-        help_heading = "Light"
-    )]
-    pub(super) gi: Gi,
+    /// What becomes of light that has met several surfaces. Unless it is given: exact, with up to 16 samples of
+    /// cached light beside it where a picture of a room is denoised, for as long as its own are few.
+    #[arg(long, value_enum, value_name = "exact|cached", help_heading = "Light")]
+    pub(super) gi: Option<Gi>,
     /// Importance table of the map; all but tile-local are for the CPU alone.
     #[arg(
         long,
@@ -306,7 +301,7 @@ impl RenderArguments {
             seed: self.seed,
             grid_columns: self.grid,
             sharing: self.sharing(),
-            gi: self.gi,
+            gi: self.gi.unwrap_or_default(),
             learning_paths: self
                 .learning_paths
                 .unwrap_or_else(|| View::suitable_learning_paths(self.sampling, size, self.spp)),

@@ -7,9 +7,11 @@ use super::{RenderArguments, frames};
 use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
+use crate::output::Films;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
+use crate::render::film::Film;
 use crate::render::{Driver, Sampling, View};
 
 /// Refuses outputs before the work rather than after it.
@@ -90,11 +92,13 @@ pub(super) fn write(
     assignment: &RenderJob,
     driver: &Driver<'_>,
     record: &Record<'_>,
+    cached: Option<(&Film, f32)>,
 ) -> Vec<Error> {
+    let films = Films { film: record.film, cached };
     let metadata = record.metadata();
     let write = |path: &PathBuf| match arguments.part {
         Some(_) => assignment.write_part(path, driver, record),
-        None => arguments.picture.write(path, record.film, &metadata),
+        None => arguments.picture.write(path, films, &metadata),
     };
     let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
     let mut failures: Vec<Error> = arguments.outputs.iter().filter_map(write_and_say).collect();

@@ -63,7 +63,7 @@ impl RenderJob {
         view: &View,
     ) -> Result<Self> {
         let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
-        if is_kept && arguments.gi == Gi::Cached {
+        if is_kept && arguments.gi == Some(Gi::Cached) {
             return Err(Error::new(
                 "--part and --checkpoint keep samples, not the cache that --gi cached ends paths in: \
                  they want --gi exact",
