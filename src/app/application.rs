@@ -14,6 +14,7 @@ use super::interface::{Dock, Interface, Tab};
 use super::library::Library;
 use super::loader::Loader;
 use super::messages::Messages;
+use super::reload::Reload;
 use super::rendering::Rendering;
 use super::save::Saves;
 use super::screen::Screen;
@@ -63,6 +64,8 @@ pub struct App {
     pub(super) messages: Messages,
     /// Scene, map and reference.
     pub(super) assets: Assets,
+    /// What looks whether their files change.
+    pub(super) reload: Option<Reload>,
     /// The worker and its pictures.
     pub(super) rendering: Rendering,
     /// What is on the screen.
@@ -107,12 +110,15 @@ impl App {
         let read = small_maps.read(start.settings.recent_maps.clone());
         tasks.run("small maps", || Ok(TaskResult::SmallMaps(read())));
         let gpu = (start.adapter, start.rays);
+        let is_watching = !start.is_repeatable;
+        let reload = is_watching.then(|| Reload::start(wakes.draw.clone())).transpose()?;
         Ok(Self {
             edited: Edited::new(start.document, start.place),
             interface: start.interface,
             library: Library::new(start.settings, history, small_maps),
             messages: Messages::default(),
             assets: Assets::new(loader),
+            reload,
             rendering: Rendering::start(wakes.relay, gpu, screen.gpu().clone())?,
             display: Display::start(screen, wakes.draw)?,
             tasks,

@@ -35,6 +35,7 @@ mod navigation;
 pub mod overlays;
 mod panels;
 pub(crate) mod presenter;
+mod reload;
 mod rendering;
 mod save;
 pub(crate) mod screen;

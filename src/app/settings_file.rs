@@ -51,6 +51,8 @@ pub struct Settings {
     pub size: PictureSize,
     /// When to stop.
     pub stop: StopRule,
+    /// Whether scene and map are read again when another program has written them.
+    pub reloads: bool,
     /// What the right panel shows.
     pub tab: Tab,
     /// What is open below the picture.
@@ -70,6 +72,7 @@ impl Default for Settings {
             light: document.light,
             size: document.size,
             stop: document.stop,
+            reloads: true,
             tab: Tab::Picture,
             dock: None,
         }

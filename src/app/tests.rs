@@ -235,6 +235,55 @@ fn a_scene_is_read_again_while_a_material_of_it_changes() {
     assert_eq!(scene.materials[0].roughness, 0.25);
 }
 
+/// Frames until something is so; it must be within a minute.
+fn until(studio: &mut Studio, is_so: impl Fn(&Studio) -> bool) {
+    let start = std::time::Instant::now();
+    while !is_so(studio) {
+        assert!(start.elapsed().as_secs() < 60, "never");
+        studio.frame().expect("drawn");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn what_another_program_writes_is_read_once_it_is_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [file, data] = ["triangle.gltf", "corners.bin"].map(|name| folder.path().join(name));
+    let corners = |size: f32| {
+        let corners = [0.0, 0.0, 0.0, size, 0.0, 0.0, 0.0, size, 0.0];
+        corners.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
+    };
+    let begin = TRIANGLE.find("data:").expect("its data");
+    let end = begin + TRIANGLE[begin..].find('"').expect("its end");
+    let linked = format!("{}corners.bin{}", &TRIANGLE[..begin], &TRIANGLE[end..]);
+    std::fs::write(&file, &linked).expect("written");
+    std::fs::write(&data, corners(1.0)).expect("written");
+    let Some(mut studio) = studio(&file.display().to_string()) else { return };
+    studio.settle().expect("rendered");
+    let size = |studio: &Studio| {
+        let scene = &studio.app.assets.scene.as_ref().expect("it is there").world.scene;
+        scene.positions.iter().map(|position| position.max_element()).fold(0.0, f32::max)
+    };
+    // Half of it, then all; then the file that names it.
+    std::fs::write(&data, &corners(2.0)[..20]).expect("written");
+    std::thread::sleep(Duration::from_millis(100));
+    std::fs::write(&data, corners(2.0)).expect("written");
+    until(&mut studio, |studio| size(studio) == 2.0);
+    let scaled = linked.replace(r#"{"mesh": 0}"#, r#"{"mesh": 0, "scale": [2, 2, 2]}"#);
+    std::fs::write(&file, &scaled).expect("written");
+    until(&mut studio, |studio| size(studio) == 4.0);
+    assert_eq!(studio.app.messages.first_error(), None, "nothing was read in part");
+
+    studio.asks(Command::ToggleReloads);
+    std::fs::write(&data, corners(3.0)).expect("written");
+    let start = std::time::Instant::now();
+    until(&mut studio, |_| start.elapsed().as_secs() >= 2);
+    assert_eq!(size(&studio), 4.0, "it was not to be");
+    studio.asks(Command::ToggleReloads);
+    until(&mut studio, |studio| size(studio) == 6.0);
+    studio.settle().expect("rendered");
+}
+
 #[test]
 fn it_is_said_once_that_no_light_gets_in() {
     let Some(mut studio) = studio("open") else { return };

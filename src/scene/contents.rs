@@ -1,6 +1,8 @@
 //! What is in a scene, and its triangles by their numbers.
 
 use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -53,6 +55,8 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     /// What fills the space between surfaces; `None` is clear air.
     pub medium: Option<Medium>,
+    /// Files beside its own that it was read from.
+    pub files: Arc<[PathBuf]>,
     /// What was repaired, skipped or assumed while loading.
     pub notices: Notices,
 }

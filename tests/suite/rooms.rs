@@ -129,11 +129,11 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 35] = [
     ("alarm", 49),
-    ("app", 10919),
+    ("app", 11020),
     ("bench", 594),
     ("bsdf", 1417),
     ("bvh", 1358),
-    ("cli", 3349),
+    ("cli", 3430),
     ("color", 25),
     ("denoise", 1290),
     ("develop", 468),

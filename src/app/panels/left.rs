@@ -20,6 +20,7 @@ use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
 use crate::scene::{Frame, Medium, Scene, builtin};
+use crate::sources::{is_built_in_map, is_built_in_scene};
 
 /// What the panel is drawn from.
 #[derive(Clone, Copy)]
@@ -102,6 +103,12 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
             scene.world.scene.textures.len(),
             theme::bytes(scene.world.bvh.memory_bytes())
         ));
+    }
+    let is_file = !is_built_in_scene(&document.scene) || !is_built_in_map(&document.map);
+    let mut reloads = sources.settings.reloads;
+    let hint = "Reads scene and map again when another program has written them";
+    if is_file && ui.checkbox(&mut reloads, "Reload on change").on_hover_text(hint).changed() {
+        commands.push(Command::ToggleReloads);
     }
 }
 

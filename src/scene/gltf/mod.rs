@@ -42,6 +42,7 @@ mod viewpoints;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::PoisonError;
 
 use glam::DAffine3;
 use gltf::json;
@@ -131,7 +132,8 @@ fn read_in(
     // Names in other encodings are no reason to refuse a file.
     let text = String::from_utf8_lossy(text);
     let document = Document::new(&text, &mut notices)?;
-    let folder = Folder { path: base_dir, allow_outside: options.allow_outside };
+    let folder =
+        Folder { path: base_dir, allow_outside: options.allow_outside, ..Folder::default() };
     let file = File::new(document, binary, folder);
     file.check_outputs(&options.outputs)?;
     let document = &file.document;
@@ -200,6 +202,9 @@ fn read_in(
     }
     scene.pair_backs();
     scene.notices = notices;
+    let found = file.folder.found.lock().unwrap_or_else(PoisonError::into_inner);
+    scene.files = found.iter().cloned().collect();
+    drop(found);
     Ok(scene)
 }
 

@@ -1,8 +1,10 @@
 //! URIs of buffers and images: `data:` and relative paths.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use super::limits::Fallible;
 use crate::image::{read_cause, read_file};
@@ -11,12 +13,14 @@ use crate::image::{read_cause, read_file};
 const DATA: &str = "data:";
 
 /// The folder that URIs are looked up in.
-#[derive(Clone, Copy)]
+#[derive(Default)]
 pub(super) struct Folder<'a> {
     /// Where the scene's file lies; `None`: there is no folder, only embedded data can be read.
     pub(super) path: Option<&'a Path>,
     /// Whether files outside of it may be read.
     pub(super) allow_outside: bool,
+    /// Files that were found.
+    pub(super) found: Mutex<BTreeSet<PathBuf>>,
 }
 
 /// What a URI stands for.
@@ -34,7 +38,7 @@ impl Folder<'_> {
     ///
     /// # Errors
     /// A cause: the URI is empty, names no file beside the scene, or a file that is not there.
-    pub(super) fn place(self, uri: Cow<'_, str>) -> Fallible<Place<'_>> {
+    pub(super) fn place<'u>(&self, uri: Cow<'u, str>) -> Fallible<Place<'u>> {
         if is_data(&uri) {
             return Ok(Place::Embedded(uri));
         }
@@ -54,7 +58,11 @@ impl Folder<'_> {
         let mut failure = String::new();
         for candidate in &names {
             match self.file(&folder, candidate) {
-                Ok(file) => return Ok(Place::File(file)),
+                Ok(file) => {
+                    let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+                    found.insert(file.clone());
+                    return Ok(Place::File(file));
+                }
                 Err(cause) => failure = cause,
             }
         }
@@ -64,7 +72,7 @@ impl Folder<'_> {
     /// The file of a name in the folder, which is given by its one path without links and as it was named.
     /// What the name alone forbids is refused before the system sees it: on Windows a look at
     /// `\\host\share` already sends the user's credentials to that host.
-    fn file(self, folder: &[PathBuf; 2], name: &str) -> Fallible<PathBuf> {
+    fn file(&self, folder: &[PathBuf; 2], name: &str) -> Fallible<PathBuf> {
         const OUTSIDE: &str = " lies outside of the scene's folder; --allow-outside would read it";
         let [real, _] = folder;
         if !self.allow_outside {
@@ -283,7 +291,7 @@ mod tests {
 
     #[test]
     fn data_uris_may_be_plain_text() {
-        let nowhere = Folder { path: None, allow_outside: false };
+        let nowhere = Folder::default();
         let read = |uri: &'static str| nowhere.place(uri.into()).and_then(|place| place.read());
         assert_eq!(read("data:text/plain,a%00b").unwrap(), b"a\0b");
         assert_eq!(read("DATA:image/png;BASE64,Zm9v").unwrap(), b"foo");
@@ -301,7 +309,9 @@ mod tests {
         if cfg!(unix) {
             fs::write(folder.path().join("tex/back\\slash?#.png"), "odd").unwrap();
         }
-        Folder { path: Some(folder.path()), allow_outside }.place(uri.into())?.read()
+        Folder { path: Some(folder.path()), allow_outside, ..Folder::default() }
+            .place(uri.into())?
+            .read()
     }
 
     /// None of these is there, so what says that it lies outside has not been looked for.
