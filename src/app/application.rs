@@ -64,8 +64,6 @@ pub struct App {
     pub(super) messages: Messages,
     /// Scene, map and reference.
     pub(super) assets: Assets,
-    /// What looks whether their files change.
-    pub(super) reload: Option<Reload>,
     /// The worker and its pictures.
     pub(super) rendering: Rendering,
     /// What is on the screen.
@@ -117,8 +115,7 @@ impl App {
             interface: start.interface,
             library: Library::new(start.settings, history, small_maps),
             messages: Messages::default(),
-            assets: Assets::new(loader),
-            reload,
+            assets: Assets::new(loader, reload),
             rendering: Rendering::start(wakes.relay, gpu, screen.gpu().clone())?,
             display: Display::start(screen, wakes.draw)?,
             tasks,

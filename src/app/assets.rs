@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::document::{Document, Viewpoint};
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
+use super::reload::Reload;
 use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
@@ -25,6 +26,8 @@ struct TransformedMap {
 /// What is loaded.
 pub(super) struct Assets {
     loader: Loader,
+    /// What looks at their files.
+    pub(super) reload: Option<Reload>,
     /// The scene that is shown.
     pub(super) scene: Option<LoadedScene>,
     /// The map in use.
@@ -38,10 +41,10 @@ pub(super) struct Assets {
 }
 
 impl Assets {
-    /// Of a loader that is at work.
-    pub(super) fn new(loader: Loader) -> Self {
+    /// Of a loader that is at work, and of what looks at files, if they are to be looked at.
+    pub(super) fn new(loader: Loader, reload: Option<Reload>) -> Self {
         let (scene, map, transformed) = (None, None, None);
-        Self { loader, scene, map, transformed, reference: None, reference_of: None }
+        Self { loader, reload, scene, map, transformed, reference: None, reference_of: None }
     }
 
     /// The scene that the document names, if it is there.
@@ -92,11 +95,29 @@ impl Assets {
             Some(map) if map.sun_factor != sun => self.loader.edit_map(map, sun),
             Some(_) => {}
         }
+        let others = self.scene_of(document).map(|scene| Arc::clone(&scene.world.scene.files));
+        if let Some(reload) = &mut self.reload {
+            let Document { scene, map, .. } = document;
+            let scene = if sources::is_built_in_scene(scene) { "" } else { scene };
+            let map = if sources::is_built_in_map(map) { "" } else { map };
+            reload.watch(Kind::Scene, scene, &others.unwrap_or_default());
+            reload.watch(Kind::Map, map, &Arc::default());
+        }
+    }
+
+    /// What another program has written anew, once what was read before is there; nothing unless it is `wanted`.
+    pub(super) fn changed(&self, document: &Document, wanted: bool) -> Vec<Kind> {
+        let Some(reload) = self.reload.as_ref().filter(|_| wanted) else { return Vec::new() };
+        let is_there = |name: &str| self.loading().all(|busy| busy != name);
+        let kinds = [(Kind::Scene, &document.scene), (Kind::Map, &document.map)];
+        let changed = |(kind, name): &(Kind, &String)| is_there(name) && reload.takes(*kind);
+        kinds.into_iter().filter(changed).map(|(kind, _)| kind).collect()
     }
 
     /// Begins to read a file of the document again; whether there is one.
     pub(super) fn read_again(&mut self, kind: Kind, document: &Document) -> bool {
         let Document { scene, map, sun, .. } = document;
+        self.reload.iter_mut().for_each(|reload| reload.forget(kind));
         match kind {
             Kind::Scene if !sources::is_built_in_scene(scene) => self.loader.load_scene(scene),
             Kind::Map if !sources::is_built_in_map(map) => self.loader.load_map(map, *sun),

@@ -32,13 +32,18 @@ impl App {
         let (interface, document) = (&mut self.interface, &mut self.edited.document);
         match command {
             Command::OpenScene(name) => self.open_scene(name),
-            Command::OpenMap(name) if document.map == name => self.read_again(&[Kind::Map]),
+            Command::OpenMap(name) if document.map == name => {
+                interface.paused &= !self.assets.read_again(Kind::Map, document);
+            }
             Command::OpenMap(name) => {
                 // The old one is not to be looked at for ever.
                 interface.paused = false;
                 document.map = name;
             }
-            Command::ReadAgain => self.read_again(&[Kind::Scene, Kind::Map]),
+            Command::ReadAgain => {
+                let mut read = |kind| self.assets.read_again(kind, document);
+                interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];
+            }
             Command::ToggleReloads => {
                 let reloads = &mut self.library.settings.reloads;
                 *reloads = !*reloads;
@@ -173,15 +178,6 @@ impl App {
     }
 
     /// Goes over to another scene; one that is shown already is read again, for its file may have changed.
-    /// Reads files of the document again.
-    pub(super) fn read_again(&mut self, kinds: &[Kind]) {
-        for &kind in kinds {
-            self.reload.iter_mut().for_each(|reload| reload.forget(kind));
-            // Paused, they would never be seen.
-            self.interface.paused &= !self.assets.read_again(kind, &self.edited.document);
-        }
-    }
-
     fn open_scene(&mut self, name: String) {
         let shown = self.assets.scene.as_ref().map(|scene| scene.name.clone());
         let shown = shown.filter(|shown| lasting_scene(shown) == lasting_scene(&name));
@@ -189,7 +185,7 @@ impl App {
         if let Some(name) = shown {
             self.interface.paused = false;
             if document.scene == name {
-                self.read_again(&[Kind::Scene]);
+                self.assets.read_again(Kind::Scene, document);
             } else {
                 // Another one was asked for, and is still being read.
                 stay_in_scene(&mut self.edited, &self.assets, &self.library);

@@ -39,6 +39,17 @@ pub struct LoadedScene {
 }
 
 impl LoadedScene {
+    /// What is to be said about it and was not said when it was read before.
+    pub(super) fn new_notices(&self, before: Option<&Self>) -> Notices {
+        let before = before.filter(|before| before.name == self.name);
+        let said: Vec<&str> =
+            before.iter().flat_map(|before| before.world.scene.notices.iter()).collect();
+        let mut new = Notices::default();
+        let notices = self.world.scene.notices.iter();
+        notices.filter(|notice| !said.contains(notice)).for_each(|notice| new.add(notice));
+        new
+    }
+
     /// Whether its materials and lights are as the document wants them.
     pub(super) fn is_edited_as(&self, document: &Document) -> bool {
         (&self.edits, self.lamps) == (&document.materials, document.lamps)

@@ -14,7 +14,7 @@ use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::tasks::TaskResult;
 use super::worker::{Request, Snapshot};
 use crate::denoise::Denoiser;
-use crate::error::{Error, Notices};
+use crate::error::Error;
 use crate::render::gpu::DeviceChoice;
 use crate::sources;
 
@@ -49,7 +49,9 @@ impl App {
         while let Some(result) = self.tasks.next_result() {
             self.take_result(result, context);
         }
-        self.take_changes();
+        for kind in self.assets.changed(&self.edited.document, self.library.settings.reloads) {
+            self.interface.paused &= !self.assets.read_again(kind, &self.edited.document);
+        }
         self.take_render_failures();
         self.rendering.collect();
         if self.rendering.turns_out_dark() {
@@ -63,32 +65,9 @@ impl App {
         self.take_display_failures();
     }
 
-    /// Reads again what another program has written, once what was read before is there.
-    fn take_changes(&mut self) {
-        let Document { scene, map, .. } = &self.edited.document;
-        let is_busy = [scene, map].map(|name| self.assets.loading().any(|busy| busy == name));
-        for (kind, is_busy) in [Kind::Scene, Kind::Map].into_iter().zip(is_busy) {
-            let reload = self.reload.as_ref().filter(|_| self.library.settings.reloads && !is_busy);
-            if reload.is_some_and(|reload| reload.takes(kind)) {
-                self.read_again(&[kind]);
-            }
-        }
-    }
-
-    /// What is to be said about a scene and was not said when it was read before.
-    fn new_notices(&self, scene: &LoadedScene) -> Notices {
-        let before = self.assets.scene.as_ref().filter(|before| before.name == scene.name);
-        let said: Vec<&str> =
-            before.iter().flat_map(|before| before.world.scene.notices.iter()).collect();
-        let mut new = Notices::default();
-        let notices = scene.world.scene.notices.iter();
-        notices.filter(|notice| !said.contains(notice)).for_each(|notice| new.add(notice));
-        new
-    }
-
     fn take_scene(&mut self, scene: LoadedScene) {
         self.messages.opened(Kind::Scene);
-        self.messages.notices(&self.new_notices(&scene));
+        self.messages.notices(&scene.new_notices(self.assets.scene.as_ref()));
         self.library.note_scene(&scene.name);
         let is_first = self.assets.scene.is_none();
         match self.assets.scene.take() {
@@ -249,7 +228,6 @@ impl App {
         fill_in_viewpoint(&mut self.edited, &self.assets);
         self.edited.follow_room(self.interface.viewport_pixels);
         self.assets.load(&self.edited.document);
-        self.watch_files();
         if let Some(request) = self.request(context.time()) {
             if request.moving {
                 context.request_repaint_after(Duration::from_millis(60));
@@ -270,17 +248,6 @@ impl App {
             let compared = compared.filter(|_| is_whole);
             self.display.order(snapshot, document, &self.interface, compared);
         }
-    }
-
-    fn watch_files(&mut self) {
-        let Some(reload) = &mut self.reload else { return };
-        let Document { scene, map, .. } = &self.edited.document;
-        let others = self.assets.scene_of(&self.edited.document);
-        let others = others.map(|scene| Arc::clone(&scene.world.scene.files)).unwrap_or_default();
-        let scene = if sources::is_built_in_scene(scene) { "" } else { scene };
-        let map = if sources::is_built_in_map(map) { "" } else { map };
-        reload.watch(Kind::Scene, scene, &others);
-        reload.watch(Kind::Map, map, &Arc::default());
     }
 
     fn request(&mut self, now: f64) -> Option<Request> {

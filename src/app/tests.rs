@@ -1,6 +1,7 @@
 //! What a person does, one step after the other, and what must come of it.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use egui::Id;
@@ -12,6 +13,7 @@ use super::document::{Document, Light, Look, PictureSize};
 use super::edited;
 use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
+use super::reload::Reload;
 use super::screenshot::{Shot, Studio};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
@@ -260,6 +262,9 @@ fn what_another_program_writes_is_read_once_it_is_whole() {
     std::fs::write(&data, corners(1.0)).expect("written");
     let Some(mut studio) = studio(&file.display().to_string()) else { return };
     studio.settle().expect("rendered");
+    studio.app.assets.reload = Some(Reload::start(Arc::new(|| ())).expect("a thread"));
+    studio.frame().expect("drawn");
+    std::thread::sleep(Duration::from_millis(200));
     let size = |studio: &Studio| {
         let scene = &studio.app.assets.scene.as_ref().expect("it is there").world.scene;
         scene.positions.iter().map(|position| position.max_element()).fold(0.0, f32::max)
