@@ -135,7 +135,8 @@ choices! {
         Depth = "depth": "Metres to the first surface"
         Samples = "samples": "Samples per pixel"
         Variance = "variance": "Variance of one sample's luminance"
-        All = "all": "All of them"
+        All = "all": "All of these"
+        Denoised = "denoised": "Linear radiance without noise"
     }
 }
 

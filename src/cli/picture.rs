@@ -26,7 +26,8 @@ pub(super) struct PictureArguments {
     /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
     #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
     white: Option<WhiteBalance>,
-    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
+    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, all of these, or
+    /// denoised: linear radiance without noise.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
     layers: Vec<LayerName>,
 }
@@ -71,6 +72,11 @@ impl PictureArguments {
     /// Refuses names no picture is written by, and denoisers that are not there.
     pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
         pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
+        if self.denoise == Some(Denoise::Off) && self.layers.contains(&LayerName::Denoised) {
+            return Err(Error::new(
+                "--layers denoised wants a denoiser: it cannot be --denoise off",
+            ));
+        }
         if self.denoise == Some(Denoise::Oidn) { Denoiser::Oidn.check() } else { Ok(()) }
     }
 
@@ -115,12 +121,13 @@ impl PictureArguments {
     /// Whether noise is to be taken out of one of these pictures or, if a filter was asked for, of those
     /// that are made of a part.
     pub(super) fn is_denoised<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> bool {
-        let mut pictures = pictures.into_iter();
-        match self.denoise {
+        let has_layer = self.layers.contains(&LayerName::Denoised);
+        pictures.into_iter().any(|path| match self.denoise {
             Some(Denoise::Off) => false,
-            Some(_) => !pictures.all(|path| output::holds_layers(path)),
-            None => pictures.any(|path| output::is_for_display(path)),
-        }
+            _ if output::holds_layers(path) => has_layer,
+            Some(_) => true,
+            None => output::is_for_display(path),
+        })
     }
 
     /// Whether albedo, normal and depth are wanted for these pictures.

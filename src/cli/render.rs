@@ -42,7 +42,7 @@ const BYTES_WITH_LAYERS: [u64; 2] = [120, 72];
 const BYTES_OF_COPY: u64 = 136;
 
 /// Most channels of a picture, and of one with layers.
-const CHANNELS: [u64; 2] = [5, 12];
+const CHANNELS: [u64; 2] = [5, 15];
 
 /// Bytes that the encoder of `.png` and the buffers of files take, and what is too small to be counted.
 const BYTES_OF_ENCODERS: u64 = 16 << 20;

@@ -29,8 +29,10 @@ pub enum LayerName {
     Samples,
     /// Variance of one sample's luminance.
     Variance,
-    /// All of them.
+    /// All of the above.
     All,
+    /// Linear radiance without noise.
+    Denoised,
 }
 
 /// Exposure of 8-bit pictures.
@@ -77,7 +79,7 @@ pub struct PictureOptions {
     pub exposure: Exposure,
     /// Tone curve of `.png` pictures.
     pub tone_curve: ToneCurve,
-    /// What takes the noise out of `.png` pictures.
+    /// What takes the noise out of `.png` pictures and of [`LayerName::Denoised`].
     pub denoiser: Option<Denoiser>,
     /// White balance of `.png` pictures.
     pub white_balance: WhiteBalance,
@@ -161,6 +163,12 @@ pub fn write_picture(
     if holds_layers(path) {
         let whole = film.without_gaps();
         let (image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
+        if options.layers.contains(&LayerName::Denoised) && options.denoiser.is_some() {
+            metadata.extend(filter_metadata(options, films));
+            let pixels = shown(options, films)?.pixels;
+            let channels = split(&pixels, ["R", "G", "B"]);
+            layers.push(Layer { name: "denoised".to_owned(), channels });
+        }
         if let Some(alpha) = alpha_of(&whole, &metadata) {
             // OpenEXR's colours are multiplied by it, as are those of a film.
             layers.push(Layer { name: String::new(), channels: vec![("A".to_owned(), alpha)] });
@@ -175,13 +183,7 @@ pub fn write_picture(
         let WhiteBalance { kelvin, tint } = options.white_balance;
         metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
     }
-    if let Some(filter) = options.filter_of(film) {
-        metadata.push(("lightgrid.denoiser".to_owned(), filter.name().to_owned()));
-        if let Some((cached, _)) = films.cached {
-            let samples = cached.min_samples().to_string();
-            metadata.push(("lightgrid.cached_samples_per_pixel".to_owned(), samples));
-        }
-    }
+    metadata.extend(filter_metadata(options, films));
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
     let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
         return write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata);
@@ -189,6 +191,18 @@ pub fn write_picture(
     let covered = display_rgb8(&divided(image, &alpha), stops, options.tone_curve);
     let alpha: Vec<u8> = alpha.iter().map(|share| (255.0 * share).round() as u8).collect();
     write_png_with_alpha(path, &covered, &alpha, &metadata)
+}
+
+/// What takes the noise out, and what helps.
+fn filter_metadata(options: &PictureOptions, films: Films<'_>) -> Vec<(String, String)> {
+    let Some(filter) = options.filter_of(films.film) else { return Vec::new() };
+    let cached = films.cached.map(|(cached, _)| {
+        ("lightgrid.cached_samples_per_pixel".to_owned(), cached.min_samples().to_string())
+    });
+    [("lightgrid.denoiser".to_owned(), filter.name().to_owned())]
+        .into_iter()
+        .chain(cached)
+        .collect()
 }
 
 /// The exposure of a film's picture, for that of others, too.
@@ -205,13 +219,17 @@ pub fn exposure_of(options: &PictureOptions, film: &Film) -> Result<Exposure> {
 }
 
 /// The film's picture under the light that looks white, without noise if that is asked for.
-fn balanced(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
-    let image = match (options.filter_of(film), options.denoiser) {
+fn balanced(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
+    shown(options, films).map(|image| options.white_balance.apply(image))
+}
+
+/// The film's picture, without noise if that is asked for.
+fn shown(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
+    Ok(match (options.filter_of(film), options.denoiser) {
         (Some(filter), _) => filter.denoise(&film.without_gaps(), cached)?,
         (None, Some(_)) => blend(film, None),
         (None, None) => film.without_gaps().image(),
-    };
-    Ok(options.white_balance.apply(image))
+    })
 }
 
 /// What surfaces show in pixels that they cover in part.

@@ -375,6 +375,15 @@ fn a_denoised_room_is_cleaner_for_cached_light_beside_its_samples() {
     });
     assert!(beside < 0.6 * exact, "squared error {} of without", beside / exact);
 
+    // The same without noise in linear light, beside what was rendered.
+    assert!(says("office", "--spp 2 --layers denoised -o layer.exr"));
+    let layer = fs::read(bench.path("layer.exr")).expect("written");
+    assert!(layer.windows(11).any(|bytes| bytes == b"denoised.R\0"));
+    let picture = |name: &str| read_picture(&bench.path(name)).expect("written");
+    assert_eq!(picture("layer.exr"), picture("exact.exr"));
+    let refused = bench.run("render office --layers denoised --denoise off -o a.exr");
+    assert!(text(&refused.stderr).contains("wants a denoiser"), "{}", text(&refused.stderr));
+
     for rest in ["--spp 1 --part 1/1 -o a.part", "--spp 1 --sampling plain -o a.png"] {
         assert!(!says("office", rest), "{rest}");
     }
