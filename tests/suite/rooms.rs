@@ -150,7 +150,7 @@ const BUDGETS: [(&str, usize); 35] = [
     ("memory", 119),
     ("metrics", 193),
     ("noise", 80),
-    ("output", 600),
+    ("output", 610),
     ("path", 2740),
     ("prefetch", 15),
     ("radiance_cache", 348),
