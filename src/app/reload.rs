@@ -78,7 +78,7 @@ impl Reload {
     }
 }
 
-/// What is known of the files of one kind.
+/// State of the files of one kind when they were read.
 #[derive(Default)]
 struct Known {
     files: BTreeMap<PathBuf, Stamp>,
@@ -129,6 +129,8 @@ fn watch(latest: &Latest<[Watched; 2]>, changed: &[AtomicBool; 2], wake: &Wake) 
     let mut known = <[Known; 2]>::default();
     loop {
         let mut has_waited = false;
+        // Without files nothing wakes the processor.
+        let period = known.iter().any(|known| !known.files.is_empty()).then_some(PERIOD);
         // `None` to end; the files are looked at without the lock.
         let news = latest.wait(|slot| match slot.value.take() {
             _ if slot.is_closed => ControlFlow::Break(None),
@@ -136,7 +138,7 @@ fn watch(latest: &Latest<[Watched; 2]>, changed: &[AtomicBool; 2], wake: &Wake) 
             None if has_waited => ControlFlow::Break(Some(None)),
             None => {
                 has_waited = true;
-                ControlFlow::Continue(Some(PERIOD))
+                ControlFlow::Continue(period)
             }
         });
         match news {

@@ -153,10 +153,8 @@ impl Job<'_> {
         let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
         let uploaded = self.uploaded.as_ref();
-        let mut beside = Beside::new(arguments, world, environment, &view);
-        if known.is_some() {
-            beside.give_up();
-        }
+        let film_bytes = needed_bytes(arguments)[0];
+        let mut beside = Beside::new(arguments, world, environment, &view, film_bytes);
         let session =
             device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
         let mut driver = assignment.driver(session);

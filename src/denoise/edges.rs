@@ -18,8 +18,8 @@ use crate::image::Image;
 pub(crate) const MIN_ALIKE: f32 = 8.0;
 /// With fewer than this it is on an edge.
 pub(crate) const WHOLE: f32 = 18.0;
-/// Up to so many samples a pixel on an edge shows the mean of those around it; with more that counts less in
-/// proportion.
+/// Pixels on edges with up to this many samples show the mean of their neighbours. With more samples the share of that
+/// mean is this constant over their number.
 pub(crate) const CHANCE_SAMPLES: f32 = 1.5;
 /// Columns and rows around a pixel that tell its light.
 const REACH: usize = 2;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::RenderArguments;
 use crate::environment::Environment;
 use crate::error::Result;
+use crate::memory;
 use crate::path::World;
 use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
@@ -27,21 +28,26 @@ pub(super) struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    /// For one picture of these arguments: not of a video, whose frames would differ by the cache's own error.
+    /// For one picture of these arguments: not of a video, whose frames would differ by the cache's own error, nor where
+    /// there is no memory for another film of `film_bytes`.
     pub(super) fn new(
         arguments: &RenderArguments,
         world: &'a World,
         environment: &'a Environment,
         view: &View,
+        film_bytes: u64,
     ) -> Self {
         let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
+        let is_one = arguments.frames.is_none() && arguments.turntable.is_none();
         let is_wanted = arguments.gi.is_none()
             && !is_kept
+            && is_one
             && worth(arguments.stop_rule().samples.unwrap_or(0)) > 0.0
             && view.sampling == Sampling::Adaptive
             && view.width.min(view.height) >= MIN_SIZE
             && arguments.picture.is_denoised(arguments.pictures())
-            && suits(world, view);
+            && suits(world, view)
+            && memory::check(film_bytes).is_ok();
         Self {
             world,
             environment,
@@ -50,11 +56,6 @@ impl<'a> Beside<'a> {
             seconds: 0.0,
             asked: arguments.seconds,
         }
-    }
-
-    /// There is none.
-    pub(super) fn give_up(&mut self) {
-        self.is_wanted = false;
     }
 
     /// Its next sample, if it is its turn; whether it was.
@@ -82,7 +83,7 @@ impl<'a> Beside<'a> {
         Ok(true)
     }
 
-    /// Its film, and what a sample of it counts beside one of a picture that has so many.
+    /// The film by cached light, and the weight of its samples beside exact ones, of which each pixel has `samples`.
     pub(super) fn film(&self, samples: u32) -> Option<(&Film, f32)> {
         let worth = worth(samples);
         self.picture.film_so_far().filter(|_| worth > 0.0).map(|film| (film, worth))
