@@ -9,6 +9,9 @@ struct Second {
     what: u32,
     position: vec3f,
     geometric_normal: vec3f,
+//#if LIFTED
+    tilt: f32,
+//#end
     shading_frame: Frame,
     bsdf: Bsdf,
 }
@@ -30,6 +33,11 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
     if what == 0u || !(cosine > 0.0 && squared > 0.0) {
         return vec4f(0.0);
     }
+//#if LIFTED
+    if lifts(vertex.point, direction) {
+        return vec4f(0.0);
+    }
+//#end
     let is_in_medium = is_kept_in_medium(what);
     let f = scattered(path, vertex, direction);
     let carried = (*path).throughput * f.value;
@@ -40,7 +48,7 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
         if !is_in_medium && !is_true_from(batch[index].shading_frame.z, normal, -direction) {
             return vec4f(0.0);
         }
-        let origin = origin_toward(vertex, direction);
+        let origin = vertex_origin_toward(vertex, direction);
         var target_ = position;
         if !is_in_medium {
             target_ = offset_origin(position, normal);
@@ -72,18 +80,6 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
 //#end
 }
 
-// Where a ray from a vertex in this direction begins.
-fn origin_toward(vertex: Vertex, direction: vec3f) -> vec3f {
-//#if MEDIUM
-    if vertex.is_in_medium {
-        return vertex.point.position;
-    }
-//#end
-    let normal = vertex.point.geometric_normal;
-    return offset_origin(
-        vertex.point.position, select(-normal, normal, dot(normal, direction) > 0.0));
-}
-
 // Radiance of second vertex `index` of the batch towards a first one.
 fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let direction = normalize(position - batch[index].position);
@@ -102,12 +98,17 @@ fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let bsdf = batch[index].bsdf;
     let wo = local_from_world(frame, direction);
     let out = bsdf_outgoing(bsdf, wo);
+//#if LIFTED
+    let horizon = -batch[index].tilt;
+//#else
+    let horizon = 0.0;
+//#end
     for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
         let light = float3(seconds[at + 2u * i + 3u]);
         if any(light != vec3f(0.0)) {
             let from_ = float3(seconds[at + 2u * i + 2u]);
             let wi = local_from_world(frame, from_);
-            if (wi.z > 0.0) == (dot(batch[index].geometric_normal, from_) > 0.0) {
+            if (wi.z > 0.0) == (dot(batch[index].geometric_normal, from_) > horizon) {
                 radiance += bsdf_eval_pdf_with(bsdf, wo, wi, out).value * light;
             }
         }
@@ -173,6 +174,9 @@ fn connect_seconds(
                     surface_at(found.x, bitcast<vec2f>(found.yz), float3(seconds[second_at_ + 1u]));
                 batch[lane].position = point.position;
                 batch[lane].geometric_normal = point.geometric_normal;
+//#if LIFTED
+                batch[lane].tilt = point.lift.tilt;
+//#end
                 batch[lane].shading_frame = point.shading_frame;
                 batch[lane].bsdf = bsdf_new(point.parameters, point.front_face);
             }

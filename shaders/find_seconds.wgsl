@@ -8,6 +8,10 @@ var<private> first: array<vec4u, 2>;
 // The direction in which it was found.
 var<private> first_direction: vec3f;
 //#end
+//#if LIFTED
+// Its geometric normal; zero where it lifts no ray.
+var<private> first_normal: vec3f;
+//#end
 // The second one, as `seconds` keeps it; there is none if the last word of the first texel is 0.
 var<private> second: array<vec4u, 2>;
 
@@ -57,6 +61,10 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if PERFECT_INTERFACES
     first_direction = (*path).ray.direction;
 //#end
+//#if LIFTED
+    let is_lifted = vertex.point.lift.tilt > 0.0;
+    first_normal = select(vec3f(0.0), vertex.point.geometric_normal, is_lifted);
+//#end
     var pairs = 0u;
 //#if MAP_SAMPLING
     pairs += 1u;
@@ -80,11 +88,15 @@ fn is_next_to_first(path: ptr<function, Path>) -> bool {
 
 // At the second vertex: whether it is shared, and the path ends.
 fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
-    let shares = (first[0].w & IS_SHARED) != 0u
+    var shares = (first[0].w & IS_SHARED) != 0u
         && (*path).is_clear
         && (*path).departure_pdf_solid_angle < F32_MAX
         && is_alike_nearby(vertex)
         && is_vertex_true_from(vertex, -(*path).ray.direction);
+//#if LIFTED
+    // Connections start from the triangle.
+    shares = shares && dot(first_normal, (*path).ray.direction) >= 0.0;
+//#end
     if shares {
         var what = IS_FOUND | ((*path).sampler.pair << 8u);
 //#if COUNTING

@@ -90,6 +90,16 @@ struct Vertex {
 //#end
 }
 
+// Where a ray from a vertex in this direction begins.
+fn vertex_origin_toward(vertex: Vertex, direction: vec3f) -> vec3f {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return vertex.point.position;
+    }
+//#end
+    return origin_toward(vertex.point, direction);
+}
+
 fn path_new(ray: Ray, sampler: Sampler) -> Path {
     var path: Path;
     path.sampler = sampler;
@@ -467,7 +477,7 @@ fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> Eva
     }
 //#end
     let wi = local_from_world(vertex.point.shading_frame, direction);
-    if (wi.z > 0.0) != (dot(vertex.point.geometric_normal, direction) > 0.0) {
+    if (wi.z > 0.0) != is_above(vertex.point, direction) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
     return bsdf_eval_pdf(vertex.bsdf, vertex.wo, wi);
@@ -503,10 +513,8 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return false;
     }
     let direction = normalize(world_from_local(vertex.point.shading_frame, sample.wi));
-    let normal = vertex.point.geometric_normal;
-    let is_above = dot(normal, direction) > 0.0;
     let is_transmission = sample.wi.z < 0.0;
-    if is_above == is_transmission {
+    if is_above(vertex.point, direction) == is_transmission {
         return false;
     }
 //#if LAYERS
@@ -525,8 +533,7 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         (*path).body = body_behind(vertex.point, (*path).body);
     }
 //#end
-    let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-    (*path).ray = Ray(origin, direction, F32_MAX);
+    (*path).ray = Ray(origin_toward(vertex.point, direction), direction, F32_MAX);
 //#if CLEAR_SOLIDS
     if is_transmission && is_clear_solid(vertex.point.material) {
         // NEE at the vertex before goes the same way.

@@ -38,27 +38,21 @@ fn shadow_towards(
     direction: vec3f,
     distance: f32,
 ) -> Shadow {
-    let normal = vertex.point.geometric_normal;
-    let is_above = dot(normal, direction) > 0.0;
     var shadow: Shadow;
-    var origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
+    let origin = vertex_origin_toward(vertex, direction);
 //#if SHADOW_MEDIA
     shadow.left = vec3f(1.0);
 //#if SOLID_TRANSMISSION
     var body = (*path).body;
+    var goes_behind = !is_above(vertex.point, direction);
 //#if MEDIUM
-    let goes_behind = !is_above && !vertex.is_in_medium;
-//#else
-    let goes_behind = !is_above;
+    goes_behind = goes_behind && !vertex.is_in_medium;
 //#end
     if goes_behind {
         body = body_behind(vertex.point, body);
     }
 //#end
 //#if MEDIUM
-    if vertex.is_in_medium {
-        origin = vertex.point.position;
-    }
 //#if SOLID_TRANSMISSION
     let stretch = stretch_in(body, origin, direction, distance);
 //#else

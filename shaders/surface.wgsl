@@ -82,9 +82,20 @@ struct SurfaceParameters {
 //#end
 }
 
+//#if LIFTED
+// Twin of `surface::Lift`.
+struct Lift {
+    height: f32,
+    tilt: f32,
+}
+//#end
+
 struct SurfacePoint {
     position: vec3f,
     geometric_normal: vec3f,
+//#if LIFTED
+    lift: Lift,
+//#end
     shading_frame: Frame,
     parameters: SurfaceParameters,
     triangle: u32,
@@ -402,6 +413,11 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     }
 //#end
     point.shading_frame = frame_from_z(normalize(normal));
+//#if LIFTED
+    if is_opaque(point.parameters) {
+        point.lift = lift_of(point, mat3x3f(a, b, c), normals, w, unmapped);
+    }
+//#end
 //#if ANISOTROPY
     if point.parameters.anisotropy > 0.0 {
         let wide = anisotropy_direction(corner, unmapped, textures[ANISOTROPY_MAP]);
@@ -423,6 +439,66 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
 //#end
     return point;
 }
+
+// Twin of `SurfaceScatterer::is_above`.
+fn is_above(point: SurfacePoint, direction: vec3f) -> bool {
+//#if LIFTED
+    return dot(point.geometric_normal, direction) > -point.lift.tilt;
+//#else
+    return dot(point.geometric_normal, direction) > 0.0;
+//#end
+}
+
+// Twin of `Lift::origin_toward`.
+fn origin_toward(point: SurfacePoint, direction: vec3f) -> vec3f {
+    let normal = point.geometric_normal;
+    var position = point.position;
+//#if LIFTED
+    if lifts(point, direction) {
+        position += point.lift.height * normal;
+    }
+//#end
+    return offset_origin(position, select(-normal, normal, is_above(point, direction)));
+}
+
+//#if LIFTED
+// Twin of `Lift::lifts`.
+fn lifts(point: SurfacePoint, direction: vec3f) -> bool {
+    return is_above(point, direction) && dot(point.geometric_normal, direction) <= 0.0;
+}
+
+fn is_opaque(p: SurfaceParameters) -> bool {
+//#if DIFFUSE_TRANSMISSION
+    if p.diffuse_transmission > 0.0 {
+        return false;
+    }
+//#end
+    return p.transmission <= 0.0;
+}
+
+// Twin of `Corner::lift`; corners and their normals are columns.
+fn lift_of(
+    point: SurfacePoint,
+    corners: mat3x3f,
+    normals: mat3x3f,
+    weights: vec3f,
+    smooth_: vec3f,
+) -> Lift {
+    let normal = point.geometric_normal;
+    let tilt = length(cross(smooth_, normal)) / length(smooth_);
+    if tilt < MIN_TILT {
+        return Lift(0.0, 0.0);
+    }
+    let side = copysign(1.0, dot(smooth_, normal));
+    var height = 0.0;
+    for (var i = 0u; i < 3u; i++) {
+        let corner = normals[i] * side;
+        let below = max(-dot(corner, point.position - corners[i]), 0.0);
+        height += weights[i] * below * max(dot(corner, normal), 0.0) / dot(corner, corner);
+    }
+    return Lift(height, select(0.0, min(tilt, MAX_TILT), height > 0.0));
+}
+//#end
 
 // Interpolated normal of the corners' (the columns), not of unit length; `flat_normal` where the
 // triangle is flat.

@@ -458,6 +458,7 @@ impl<'a> Path<'a> {
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
             geometric_normal: point.geometric_normal,
+            lift: point.lift,
             shading_frame: point.shading_frame,
             bsdf: bsdf.viewed_from(wo),
             behind: material.behind(point),

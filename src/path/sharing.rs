@@ -134,9 +134,10 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
             }
             let throughput = path.throughput;
             if path.visit(&vertex)
+                && let is_lifted = vertex.scatterer.lifts(path.ray.direction)
                 && let Some(second) = path.next_vertex(second_bsdf)
             {
-                if !(shares && path.is_found_alike(&second)) {
+                if !(shares && !is_lifted && path.is_found_alike(&second)) {
                     if path.visit(&second) {
                         path.run();
                     }
@@ -305,6 +306,9 @@ impl Second<'_, '_> {
                 Scatterer::Medium(_) => 1.0,
             };
             if !(cosine > 0.0 && squared > 0.0) {
+                continue;
+            }
+            if first.vertex.scatterer.lifts(direction) {
                 continue;
             }
             let scattered = first.vertex.scatterer.scattered(direction);

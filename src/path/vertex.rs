@@ -5,9 +5,9 @@ use glam::{Vec2, Vec3};
 use super::body::Body;
 use super::light_tree::Receiver;
 use crate::bsdf::{Bsdf, ViewedBsdf};
-use crate::bvh::offset_origin;
 use crate::math::Frame;
 use crate::medium::Phase;
+use crate::scene::surface::Lift;
 
 /// A place at which light is scattered.
 pub(super) struct Vertex<'v> {
@@ -55,6 +55,7 @@ pub(super) struct MediumScatterer {
 
 pub(super) struct SurfaceScatterer<'v> {
     pub(super) geometric_normal: Vec3,
+    pub(super) lift: Lift,
     pub(super) shading_frame: Frame,
     /// Towards where the path came from, in the shading frame.
     pub(super) bsdf: ViewedBsdf<'v>,
@@ -78,6 +79,14 @@ impl Scatterer<'_> {
                 let density = medium.pdf_solid_angle(direction);
                 Some((Vec3::splat(density), density))
             }
+        }
+    }
+
+    /// Whether rays in this direction do not start from the vertex itself ([`Lift`]).
+    pub(super) fn lifts(&self, direction: Vec3) -> bool {
+        match self {
+            Self::Surface(surface) => surface.lift.lifts(surface.geometric_normal.dot(direction)),
+            Self::Medium(_) => false,
         }
     }
 
@@ -137,13 +146,13 @@ impl<'v> SurfaceScatterer<'v> {
 
     /// Whether a direction points to the side that the path came from.
     pub(super) fn is_above(&self, direction: Vec3) -> bool {
-        self.geometric_normal.dot(direction) > 0.0
+        self.lift.is_above(self.geometric_normal.dot(direction))
     }
 
     /// Where a ray from `position` in this direction begins.
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
         let normal = self.geometric_normal;
-        offset_origin(position, if self.is_above(direction) { normal } else { -normal })
+        self.lift.origin_toward(position, normal, normal.dot(direction))
     }
 }
 

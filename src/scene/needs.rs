@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{AlphaMode, Material, Scene};
+use super::{AlphaMode, Material, Scene, surface};
 
 bitflags::bitflags! {
     /// What a scene uses: what it does without is neither evaluated nor, on a GPU, compiled.
@@ -68,6 +68,8 @@ bitflags::bitflags! {
         const PERFECT_INTERFACES = 1 << 27;
         /// Single-sided surfaces that all rays pass from behind.
         const BACKED = 1 << 28;
+        /// Opaque triangles that stand for a smooth surface ([`super::surface::Lift`]).
+        const LIFTED = 1 << 29;
     }
 }
 
@@ -97,7 +99,7 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(SceneFeatures, &str, Option<&str>); 27] = {
+const WORDS: [(SceneFeatures, &str, Option<&str>); 28] = {
     use SceneFeatures as S;
     [
         (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
@@ -159,6 +161,13 @@ const WORDS: [(SceneFeatures, &str, Option<&str>); 27] = {
             "Multiple scattering of rough glass",
             Some("multiple scattering of glass: no glass is rough"),
         ),
+        (
+            S::LIFTED,
+            "Smooth surfaces above their triangles",
+            Some(
+                "smooth surfaces above triangles: every opaque triangle is as flat as its normals",
+            ),
+        ),
     ]
 };
 
@@ -174,6 +183,7 @@ impl SceneNeeds {
         needs.features.set(SceneFeatures::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
         needs.features.set(SceneFeatures::FOG, scene.medium.is_some());
         needs.features.set(SceneFeatures::INSTANCES, !scene.instances.is_empty());
+        needs.features.set(SceneFeatures::LIFTED, surface::lifts(scene));
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
             needs.add(material);
         }

@@ -3,9 +3,11 @@
 use std::borrow::Cow;
 
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
+use rayon::prelude::*;
 
 use super::texture::sample_texture;
 use super::{AlphaMode, Material, Placing, Scene, TextureRef, TextureSlot as Slot};
+use crate::bvh::offset_origin;
 use crate::math::Frame;
 
 /// A shading normal is bent until its cosine with the viewer is at least this share of the geometric
@@ -15,6 +17,13 @@ pub(crate) const MIN_COSINE_SHARE: f32 = 0.05;
 /// Least cosine with the geometric normal of the direction in which a mirror shows the viewer
 /// something (Cycles' `ensure_valid_specular_reflection`).
 pub(crate) const MIN_MIRROR_COSINE: f32 = 0.01;
+
+/// Least sine between a smooth normal and its triangle's for which rays start from the smooth surface: coarser
+/// than the rounding of normals, finer than anything that a shadow's edge shows.
+pub(crate) const MIN_TILT: f32 = 0.01;
+
+/// Greatest sine that counts: beyond it normals do not describe the shape (leaves lit as a tree's outside).
+pub(crate) const MAX_TILT: f32 = 0.6;
 
 /// Material at one point, textures already read. Colours are linear Rec.709.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -168,10 +177,45 @@ pub struct SurfacePoint<'a> {
     /// World frame of local directions; z is the shading normal, on the viewer's side and within the
     /// geometric normal's hemisphere.
     pub shading_frame: Frame,
+    /// Where the smooth surface lies that the triangle stands for.
+    pub lift: Lift,
     /// Whether the viewer sees the front (counter-clockwise) side.
     pub front_face: bool,
     /// The material, textures read; borrowed where it is that of any point.
     pub parameters: Cow<'a, SurfaceParameters>,
+}
+
+/// A point of the smooth, convex and opaque surface that a flat triangle stands for, relative to the triangle's.
+/// Light that grazes the smooth surface would be below the triangle and leave black facets at a shadow's edge:
+/// its rays start from the smooth surface (Hanika 2021, *Hacking the Shadow Terminator*, Ray Tracing Gems II).
+/// Other rays start from the triangle. Zero where the surface is flat, concave or lets light through.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lift {
+    /// Metres along the geometric normal, at least 0.
+    pub height: f32,
+    /// Sine between the smooth normal and the geometric one, in `[0, MAX_TILT]`.
+    pub tilt: f32,
+}
+
+impl Lift {
+    /// Whether a direction of this cosine with the geometric normal is above the surface.
+    pub fn is_above(self, cosine: f32) -> bool {
+        cosine > -self.tilt
+    }
+
+    /// Whether rays in a direction of this cosine start from the smooth surface.
+    pub fn lifts(self, cosine: f32) -> bool {
+        cosine <= 0.0 && self.is_above(cosine)
+    }
+
+    /// Where a ray from `position` begins that has this cosine with the unit `geometric_normal`.
+    pub fn origin_toward(self, position: Vec3, geometric_normal: Vec3, cosine: f32) -> Vec3 {
+        if self.lifts(cosine) {
+            offset_origin(position + self.height * geometric_normal, geometric_normal)
+        } else {
+            offset_origin(position, if cosine > 0.0 { geometric_normal } else { -geometric_normal })
+        }
+    }
 }
 
 impl<'a> SurfacePoint<'a> {
@@ -213,7 +257,9 @@ impl<'a> SurfacePoint<'a> {
         let geometric_normal = if front_face { front_normal } else { -front_normal };
 
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
-        let unmapped = corner.smooth_normal().unwrap_or(front_normal);
+        let normals = corner.normals();
+        let smooth_normal = normals.map(|normals| corner.blend(normals));
+        let unmapped = smooth_normal.filter(is_a_direction).unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
         let (texture, scale) = (material.texture(Slot::Normal), material.normal_scale);
         let mut normal = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
@@ -222,6 +268,13 @@ impl<'a> SurfacePoint<'a> {
             normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
         }
         let shading_frame = Frame::from_z(normal.normalize());
+        let is_opaque = parameters.transmission <= 0.0 && parameters.diffuse_transmission <= 0.0;
+        let lift = match normals {
+            Some(normals) if is_opaque => {
+                corner.lift(position, normals, unmapped, geometric_normal)
+            }
+            _ => Lift::default(),
+        };
         if parameters.anisotropy > 0.0 {
             let world = corner.anisotropy_direction(unmapped);
             let local = shading_frame.local_from_world(world);
@@ -240,10 +293,36 @@ impl<'a> SurfacePoint<'a> {
             position,
             geometric_normal,
             shading_frame,
+            lift,
             front_face,
             parameters,
         }
     }
+}
+
+/// Whether any triangle of a scene has a [`Lift`] somewhere.
+pub(crate) fn lifts(scene: &Scene) -> bool {
+    let may_be_opaque = |m: &Material| {
+        let factors = [
+            (m.transmission, Slot::Transmission),
+            (m.diffuse_transmission, Slot::DiffuseTransmission),
+        ];
+        factors.into_iter().all(|(factor, slot)| factor <= 0.0 || m.texture(slot).is_some())
+    };
+    let is_opaque: Vec<bool> = scene.materials.iter().map(may_be_opaque).collect();
+    let is_lifted = |place: usize| {
+        let vertices = scene.triangles[place].map(|i| i as usize);
+        let [a, b, c] = vertices.map(|i| scene.positions[i]);
+        let geometric = (b - a).cross(c - a).normalize_or_zero();
+        let tilts = |i: usize| tilt(scene.normals[i], geometric) >= MIN_TILT;
+        is_opaque[scene.triangle_materials[place] as usize] && vertices.into_iter().any(tilts)
+    };
+    !scene.normals.is_empty() && (0..scene.triangles.len()).into_par_iter().any(is_lifted)
+}
+
+/// Sine between a normal of any length and a unit one; not a number without a direction.
+fn tilt(normal: Vec3, geometric_normal: Vec3) -> f32 {
+    normal.cross(geometric_normal).length() / normal.length()
 }
 
 /// Opacity in `[0,1]` of a point: 1 if the material is opaque, 0 or 1 if it is masked, its alpha if
@@ -337,8 +416,8 @@ impl<'a> Corner<'a> {
         color * self.interpolate(&self.scene.colors)
     }
 
-    /// Interpolated normal, not of unit length; `None` where the triangle is flat.
-    fn smooth_normal(&self) -> Option<Vec3> {
+    /// Normals of the corners, not of unit length; `None` where the triangle is flat.
+    fn normals(&self) -> Option<[Vec3; 3]> {
         if self.scene.normals.is_empty() {
             return None;
         }
@@ -346,8 +425,25 @@ impl<'a> Corner<'a> {
         if normals.contains(&Vec3::ZERO) {
             return None;
         }
-        let normals = self.placing.map_or(normals, |placing| normals.map(|n| placing.normal(n)));
-        Some(self.blend(normals)).filter(|n| n.length_squared() > 1e-12)
+        Some(self.placing.map_or(normals, |placing| normals.map(|n| placing.normal(n))))
+    }
+
+    /// Where the smooth surface is above the triangle: each corner's tangent plane lifts the point to itself
+    /// where it is higher, and the three points are blended.
+    fn lift(&self, position: Vec3, normals: [Vec3; 3], smooth: Vec3, geometric: Vec3) -> Lift {
+        let tilt = tilt(smooth, geometric);
+        if tilt < MIN_TILT {
+            return Lift::default();
+        }
+        let side = 1.0_f32.copysign(smooth.dot(geometric));
+        let corners = self.positions();
+        let heights = [0, 1, 2].map(|i| {
+            let normal = normals[i] * side;
+            let below = (-normal.dot(position - corners[i])).max(0.0);
+            below * normal.dot(geometric).max(0.0) / normal.length_squared()
+        });
+        let height = self.blend(heights);
+        if height > 0.0 { Lift { height, tilt: tilt.min(MAX_TILT) } } else { Lift::default() }
     }
 
     /// The normal a tangent-space map makes of `normal`, not of unit length. Neither normal nor
@@ -389,6 +485,10 @@ impl<'a> Corner<'a> {
 
 fn unit(x: f32) -> f32 {
     x.clamp(0.0, 1.0)
+}
+
+fn is_a_direction(normal: &Vec3) -> bool {
+    normal.length_squared() > 1e-12
 }
 
 /// Coefficient that turns white into the attenuation colour over the attenuation distance

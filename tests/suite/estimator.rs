@@ -14,6 +14,7 @@ mod many_lights;
 mod repeatable;
 pub(crate) mod scenes;
 mod sharing;
+mod smooth_shapes;
 mod through_glass;
 mod unbiased;
 

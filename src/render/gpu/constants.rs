@@ -88,6 +88,8 @@ constants! {
     MEDIUM_FACE: cells::MEDIUM_FACE,
     MIN_COSINE_SHARE: surface::MIN_COSINE_SHARE,
     MIN_MIRROR_COSINE: surface::MIN_MIRROR_COSINE,
+    MIN_TILT: surface::MIN_TILT,
+    MAX_TILT: surface::MAX_TILT,
     MIN_SHEEN_ROUGHNESS: sheen::MIN_ROUGHNESS,
     MAX_COUNTED: path::MAX_COUNTED,
     MAX_TIMES: train::MAX_TIMES,

@@ -1,10 +1,12 @@
 //! Hand-built scenes whose answers can be worked out.
 
+use std::f32::consts::PI;
+
 use glam::{Affine2, Affine3A, Mat3, Vec3};
 use lightgrid::path::{World, WorldBuilder};
 use lightgrid::scene::{
-    AlphaMode, Camera, Material, Projection, PunctualKind, PunctualLight, Texture, TextureImage,
-    TextureRef, TextureSlot, Wrap,
+    AlphaMode, Camera, Material, Projection, PunctualKind, PunctualLight, Scene, Texture,
+    TextureImage, TextureRef, TextureSlot, Wrap,
 };
 
 /// [`Material::lambert`].
@@ -71,6 +73,39 @@ pub(crate) fn orthographic(eye: Vec3) -> Camera {
         world_from_camera: Affine3A::from_mat3_translation(Mat3::IDENTITY, eye),
         projection: Projection::Orthographic { half_height: 1.0 },
         ..Camera::look_at(eye, eye - Vec3::Z, 1.0)
+    }
+}
+
+/// A ball of radius 1 around the origin with the normals of a sphere, of so many rows of faces and twice as many
+/// columns; its front is outside.
+pub(crate) fn smooth_ball(material: &Material, rows: u32) -> Scene {
+    let at = |row: u32, column: u32| {
+        let (sin, cos) = (PI * row as f32 / rows as f32).sin_cos();
+        let (sin_around, cos_around) = (PI * column as f32 / rows as f32).sin_cos();
+        Vec3::new(sin * cos_around, cos, sin * sin_around)
+    };
+    let columns = 2 * rows;
+    let corner = |row: u32, column: u32| row * columns + column % columns;
+    let positions: Vec<Vec3> =
+        (0..=rows).flat_map(|row| (0..columns).map(move |column| at(row, column))).collect();
+    let mut triangles = Vec::new();
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let [a, b] = [corner(row, column), corner(row, column + 1)];
+        let [c, d] = [corner(row + 1, column + 1), corner(row + 1, column)];
+        if row > 0 {
+            triangles.push([a, b, c]);
+        }
+        if row + 1 < rows {
+            triangles.push([a, c, d]);
+        }
+    }
+    Scene {
+        normals: positions.clone(),
+        triangle_materials: vec![0; triangles.len()],
+        triangles,
+        positions,
+        materials: vec![material.clone()],
+        ..Scene::default()
     }
 }
 

@@ -99,6 +99,7 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
             "let triangle = take_word(); let barycentric = take2();
             let point = surface_at(triangle, barycentric, take3());
             put3(point.position); put3(point.geometric_normal); put_bool(point.front_face);
+            put2(vec2f(point.lift.height, point.lift.tilt));
             put3(point.shading_frame.x); put3(point.shading_frame.z);
             put_parameters(point.parameters);",
             cases(edges(), case_of),
@@ -111,9 +112,32 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
                     if triangle < own { 1.0 } else { 8.0 / height(scene.corners(triangle)) };
                 t.near(point.geometric_normal, ulps(8.0).of(turned));
                 t.same(point.front_face);
+                t.near(point.lift.height, ulps(64.0).of(turned));
+                t.near(point.lift.tilt, ulps(64.0).of(turned));
                 t.near(point.shading_frame.x, ulps(256.0).of(turned));
                 t.near(point.shading_frame.z, ulps(256.0).of(turned));
                 expect_parameters(t, &point.parameters, ulps(256.0).of(1.0));
+            },
+        )
+        .flips(500),
+        Probe::new(
+            "origin_toward",
+            "let triangle = take_word(); let barycentric = take2();
+            let point = surface_at(triangle, barycentric, take3());
+            let direction = take3();
+            put_bool(is_above(point, direction)); put3(origin_toward(point, direction));",
+            cases([], |r| {
+                let (triangle, barycentric) = place(r, scene);
+                case(&[&triangle, &barycentric, &r.direction(), &r.direction()])
+            }),
+            move |t| {
+                let (triangle, barycentric, seen) = (t.take_word(), t.take2(), t.take3());
+                let point = SurfacePoint::at(scene, triangle, barycentric, seen);
+                let cosine = point.geometric_normal.dot(t.take3());
+                t.same(point.lift.is_above(cosine));
+                let origin =
+                    point.lift.origin_toward(point.position, point.geometric_normal, cosine);
+                t.near(origin, ulps(64.0).of(4.0));
             },
         )
         .flips(500),
