@@ -10,7 +10,7 @@ struct Second {
     position: vec3f,
     geometric_normal: vec3f,
 //#if LIFTED
-    tilt: f32,
+    lift: f32,
 //#end
     shading_frame: Frame,
     bsdf: Bsdf,
@@ -99,7 +99,7 @@ fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let wo = local_from_world(frame, direction);
     let out = bsdf_outgoing(bsdf, wo);
 //#if LIFTED
-    let horizon = -batch[index].tilt;
+    let horizon = horizon_of(batch[index].geometric_normal, frame.z, batch[index].lift);
 //#else
     let horizon = 0.0;
 //#end
@@ -175,7 +175,7 @@ fn connect_seconds(
                 batch[lane].position = point.position;
                 batch[lane].geometric_normal = point.geometric_normal;
 //#if LIFTED
-                batch[lane].tilt = point.lift.tilt;
+                batch[lane].lift = point.lift;
 //#end
                 batch[lane].shading_frame = point.shading_frame;
                 batch[lane].bsdf = bsdf_new(point.parameters, point.front_face);

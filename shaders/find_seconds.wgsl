@@ -62,7 +62,7 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
     first_direction = (*path).ray.direction;
 //#end
 //#if LIFTED
-    let is_lifted = vertex.point.lift.tilt > 0.0;
+    let is_lifted = vertex.point.lift > 0.0;
     first_normal = select(vec3f(0.0), vertex.point.geometric_normal, is_lifted);
 //#end
     var pairs = 0u;

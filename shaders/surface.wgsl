@@ -82,19 +82,11 @@ struct SurfaceParameters {
 //#end
 }
 
-//#if LIFTED
-// Twin of `surface::Lift`.
-struct Lift {
-    height: f32,
-    tilt: f32,
-}
-//#end
-
 struct SurfacePoint {
     position: vec3f,
     geometric_normal: vec3f,
 //#if LIFTED
-    lift: Lift,
+    lift: f32,
 //#end
     shading_frame: Frame,
     parameters: SurfaceParameters,
@@ -440,29 +432,37 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     return point;
 }
 
-// Twin of `SurfaceScatterer::is_above`.
+// Twin of `Sides::is_above`.
 fn is_above(point: SurfacePoint, direction: vec3f) -> bool {
 //#if LIFTED
-    return dot(point.geometric_normal, direction) > -point.lift.tilt;
+    let horizon = horizon_of(point.geometric_normal, point.shading_frame.z, point.lift);
+    return dot(point.geometric_normal, direction) > horizon;
 //#else
     return dot(point.geometric_normal, direction) > 0.0;
 //#end
 }
 
-// Twin of `Lift::origin_toward`.
+// Twin of `Sides::origin_toward`.
 fn origin_toward(point: SurfacePoint, direction: vec3f) -> vec3f {
-    let normal = point.geometric_normal;
-    var position = point.position;
+    let is_in_front = dot(point.geometric_normal, direction) > 0.0;
+    let normal = select(-point.geometric_normal, point.geometric_normal, is_in_front);
 //#if LIFTED
     if lifts(point, direction) {
-        position += point.lift.height * normal;
+        return offset_origin(point.position - point.lift * normal, -normal);
     }
 //#end
-    return offset_origin(position, select(-normal, normal, is_above(point, direction)));
+    return offset_origin(point.position, normal);
 }
 
 //#if LIFTED
-// Twin of `Lift::lifts`.
+// Twin of `Sides::horizon`.
+fn horizon_of(geometric_normal: vec3f, shading_normal: vec3f, lift: f32) -> f32 {
+    let cosine = dot(geometric_normal, shading_normal);
+    let tilt = min(sqrt(max(1.0 - cosine * cosine, 0.0)), MAX_TILT);
+    return select(0.0, -tilt, lift > 0.0);
+}
+
+// Twin of `Sides::lifts`.
 fn lifts(point: SurfacePoint, direction: vec3f) -> bool {
     return is_above(point, direction) && dot(point.geometric_normal, direction) <= 0.0;
 }
@@ -483,11 +483,10 @@ fn lift_of(
     normals: mat3x3f,
     weights: vec3f,
     smooth_: vec3f,
-) -> Lift {
+) -> f32 {
     let normal = point.geometric_normal;
-    let tilt = length(cross(smooth_, normal)) / length(smooth_);
-    if tilt < MIN_TILT {
-        return Lift(0.0, 0.0);
+    if length(cross(smooth_, normal)) < MIN_TILT * length(smooth_) {
+        return 0.0;
     }
     let side = copysign(1.0, dot(smooth_, normal));
     var height = 0.0;
@@ -496,7 +495,7 @@ fn lift_of(
         let below = max(-dot(corner, point.position - corners[i]), 0.0);
         height += weights[i] * below * max(dot(corner, normal), 0.0) / dot(corner, corner);
     }
-    return Lift(height, select(0.0, min(tilt, MAX_TILT), height > 0.0));
+    return height;
 }
 //#end
 

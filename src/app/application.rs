@@ -231,7 +231,9 @@ impl App {
         panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
             Tab::Scene => panels::left::sections(ui, document, interface, sources, commands),
             Tab::Picture => {
-                panels::picture::show(ui, document, exposure_ev, commands);
+                let snapshot = self.rendering.snapshot.as_ref();
+                let cut_off = snapshot.and_then(|snapshot| snapshot.cut_off.as_deref());
+                panels::picture::show(ui, document, (exposure_ev, cut_off), commands);
                 panels::history::show(ui, history, &mut interface.compared, commands);
             }
             Tab::Inspect => {

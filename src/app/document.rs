@@ -132,7 +132,7 @@ impl Default for Document {
                 device: DeviceChoice::Auto,
                 sampling: Sampling::Adaptive,
                 split: false,
-                bounces: 8,
+                bounces: PathLimits::default().bounces,
                 seed: 0,
             },
             look: Look {
@@ -238,7 +238,7 @@ impl Document {
         let [width, height] = crop.map_or(whole, |(_, size)| size);
         Some(View {
             sampling: self.light.sampling,
-            limits: PathLimits { bounces: self.light.bounces, russian_roulette: true },
+            limits: PathLimits { bounces: self.light.bounces, ..PathLimits::default() },
             seed: self.light.seed,
             // What neighbours share, denoising cannot tell from light.
             sharing: Sharing::Off,

@@ -26,7 +26,7 @@ use crate::output::{self, Exposure};
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceChoice, UploadedScene};
-use crate::render::{Driver, Figures, Session};
+use crate::render::{Driver, Figures, Session, cut_off_notice};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
@@ -69,6 +69,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
     arguments.check_fog(&world.scene, &mut notices);
+    let view = arguments.view(&world, camera.clone());
+    if let Some(sentence) = cut_off_notice(&world, &environment, &view) {
+        notices.add(sentence);
+    }
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
     memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;

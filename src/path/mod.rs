@@ -22,6 +22,7 @@ mod gather;
 mod learn;
 pub(crate) mod light_tree;
 mod lights;
+mod limits;
 mod looks;
 mod materials;
 mod ray_clock;
@@ -36,6 +37,8 @@ pub use background::Background;
 pub(crate) use learn::MAX_COUNTED;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
+pub use limits::PathLimits;
+pub(crate) use limits::{CutOff, MAX_INTERFACES, MIN_SURVIVAL, ROULETTE_AFTER, ROULETTE_MILDNESS};
 pub use looks::FirstHit;
 pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
@@ -55,21 +58,6 @@ use crate::radiance_cache::RadianceCache;
 use crate::sampler::Sampler;
 use crate::scene::needs::SceneFeatures;
 use crate::scene::surface::SurfacePoint;
-
-/// What bounds a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PathLimits {
-    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only, 0 sees emitters
-    /// and the environment alone. Perfect mirrors and smooth glass scatter none.
-    pub bounces: u32,
-    /// Whether dim paths are ended at random.
-    pub russian_roulette: bool,
-}
-
-impl PathLimits {
-    /// Most [`Self::bounces`] that may be asked for.
-    pub const MAX_BOUNCES: u32 = 100_000;
-}
 
 /// All that a path reads.
 #[derive(Clone, Copy)]
@@ -110,20 +98,8 @@ pub struct PathResult {
     pub is_minor: bool,
 }
 
-/// Vertices after which Russian roulette may end a path.
-pub(crate) const ROULETTE_AFTER: u32 = 3;
-/// A path that carries less than one over this is ended in proportion: ending it as soon as it carries
-/// less than 1 saves a third of the rays of an office and doubles its error.
-pub(crate) const ROULETTE_MILDNESS: f32 = 3.0;
-
-/// Least probability of surviving it: a path that carries little is not made to count for too much.
-pub(crate) const MIN_SURVIVAL: f32 = 0.05;
-
 /// Share of the way to a light, or to a vertex, that a shadow ray goes: it stops short of that surface.
 pub(crate) const SHADOW_RAY_SHARE: f32 = 1.0 - 1e-4;
-
-/// Most perfect reflections and refractions in a row; only light that is caught in a solid has more.
-pub(crate) const MAX_INTERFACES: u32 = 64;
 
 /// Panes and leaves one ray may pass; only a scene that is broken has more.
 pub(crate) const MAX_PASSES: u32 = 1000;
@@ -251,16 +227,6 @@ impl<'a> Path<'a> {
         let onward = self.choose_onward(vertex);
         self.gather(vertex, &lights);
         onward.is_some_and(|onward| self.go_on(vertex, &onward)) && self.survives()
-    }
-
-    /// Counts a vertex; `false` if the path may have no more of them.
-    fn counts_vertex(&mut self) -> bool {
-        if self.bounces == self.tracer.limits.bounces {
-            return false;
-        }
-        self.bounces += 1;
-        self.interfaces = 0;
-        true
     }
 
     /// Whether nothing has reflected, refracted or scattered it yet.
@@ -577,26 +543,5 @@ impl<'a> Path<'a> {
             is_refracted: false,
         };
         self.map_samples = 1;
-    }
-
-    /// Russian roulette.
-    fn survives(&mut self) -> bool {
-        let Some(probability) = self.survival() else { return false };
-        self.throughput /= probability;
-        true
-    }
-
-    /// With which probability the path has survived; `None` if it has not. By throughput, as it would
-    /// be in air: refraction into a body is no loss.
-    fn survival(&mut self) -> Option<f32> {
-        let is_young = self.bounces + self.interfaces < ROULETTE_AFTER;
-        if !self.tracer.limits.russian_roulette || is_young {
-            return Some(1.0);
-        }
-        let in_air = self.throughput.max_element() * self.body.squared_index;
-        let carried = self.throughput_before * in_air;
-        let probability = (ROULETTE_MILDNESS * carried).clamp(MIN_SURVIVAL, 1.0);
-        let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
-        survives.then_some(probability)
     }
 }

@@ -7,7 +7,7 @@ use super::light_tree::Receiver;
 use crate::bsdf::{Bsdf, ViewedBsdf};
 use crate::math::Frame;
 use crate::medium::Phase;
-use crate::scene::surface::Lift;
+use crate::scene::surface::Sides;
 
 /// A place at which light is scattered.
 pub(super) struct Vertex<'v> {
@@ -55,7 +55,8 @@ pub(super) struct MediumScatterer {
 
 pub(super) struct SurfaceScatterer<'v> {
     pub(super) geometric_normal: Vec3,
-    pub(super) lift: Lift,
+    /// [`SurfacePoint::lift`](crate::scene::surface::SurfacePoint::lift).
+    pub(super) lift: f32,
     pub(super) shading_frame: Frame,
     /// Towards where the path came from, in the shading frame.
     pub(super) bsdf: ViewedBsdf<'v>,
@@ -82,10 +83,10 @@ impl Scatterer<'_> {
         }
     }
 
-    /// Whether rays in this direction do not start from the vertex itself ([`Lift`]).
+    /// Whether rays in this direction do not start from the vertex itself ([`Sides::lifts`]).
     pub(super) fn lifts(&self, direction: Vec3) -> bool {
         match self {
-            Self::Surface(surface) => surface.lift.lifts(surface.geometric_normal.dot(direction)),
+            Self::Surface(surface) => surface.sides().lifts(direction),
             Self::Medium(_) => false,
         }
     }
@@ -146,13 +147,17 @@ impl<'v> SurfaceScatterer<'v> {
 
     /// Whether a direction points to the side that the path came from.
     pub(super) fn is_above(&self, direction: Vec3) -> bool {
-        self.lift.is_above(self.geometric_normal.dot(direction))
+        self.sides().is_above(direction)
     }
 
     /// Where a ray from `position` in this direction begins.
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
-        let normal = self.geometric_normal;
-        self.lift.origin_toward(position, normal, normal.dot(direction))
+        self.sides().origin_toward(position, direction)
+    }
+
+    fn sides(&self) -> Sides {
+        let Self { geometric_normal, shading_frame, lift, .. } = *self;
+        Sides { geometric_normal, shading_normal: shading_frame.z, lift }
     }
 }
 

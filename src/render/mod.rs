@@ -31,7 +31,8 @@ pub use progress::{Figures, Phase, StopRule};
 pub(crate) use session::SessionState;
 pub use session::{Doubling, Session};
 pub use view::{Crop, Gi, Sampling, Sharing, View};
+pub(crate) use view_probe::cut_off_notice;
 
 /// Version of what samples are made of: raised when a picture of the same options and seed is another than before.
 /// Parts and checkpoints of other versions are refused.
-pub const SAMPLES_VERSION: u32 = 2;
+pub const SAMPLES_VERSION: u32 = 3;

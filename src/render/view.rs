@@ -156,7 +156,7 @@ impl View {
             height,
             filter: PixelFilter::default(),
             sampling,
-            limits: PathLimits { bounces: 8, russian_roulette: true },
+            limits: PathLimits::default(),
             seed: 0,
             sharing: Sharing::default(),
             gi: Gi::default(),

@@ -68,7 +68,7 @@ bitflags::bitflags! {
         const PERFECT_INTERFACES = 1 << 27;
         /// Single-sided surfaces that all rays pass from behind.
         const BACKED = 1 << 28;
-        /// Opaque triangles that stand for a smooth surface ([`super::surface::Lift`]).
+        /// Opaque triangles that stand for a smooth surface ([`super::surface::SurfacePoint::lift`]).
         const LIFTED = 1 << 29;
     }
 }

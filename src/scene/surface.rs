@@ -18,9 +18,9 @@ pub(crate) const MIN_COSINE_SHARE: f32 = 0.05;
 /// something (Cycles' `ensure_valid_specular_reflection`).
 pub(crate) const MIN_MIRROR_COSINE: f32 = 0.01;
 
-/// Least sine between a smooth normal and its triangle's for which rays start from the smooth surface: coarser
-/// than the rounding of normals, finer than anything that a shadow's edge shows.
-pub(crate) const MIN_TILT: f32 = 0.01;
+/// Least sine between the normal of a smooth shape and its triangle's for which rays start from the shape: light that
+/// grazes a surface by less is too faint to show facets.
+pub(crate) const MIN_TILT: f32 = 0.03;
 
 /// Greatest sine that counts: beyond it normals do not describe the shape (leaves lit as a tree's outside).
 pub(crate) const MAX_TILT: f32 = 0.6;
@@ -177,44 +177,56 @@ pub struct SurfacePoint<'a> {
     /// World frame of local directions; z is the shading normal, on the viewer's side and within the
     /// geometric normal's hemisphere.
     pub shading_frame: Frame,
-    /// Where the smooth surface lies that the triangle stands for.
-    pub lift: Lift,
+    /// Height in metres over the triangle of the smooth, convex and opaque shape that it stands for; 0 where there
+    /// is none. Light that grazes the shape is below the triangle, which leaves black facets at a shadow's edge: its
+    /// rays start from the shape (Hanika 2021, *Hacking the Shadow Terminator*, Ray Tracing Gems II).
+    pub lift: f32,
     /// Whether the viewer sees the front (counter-clockwise) side.
     pub front_face: bool,
     /// The material, textures read; borrowed where it is that of any point.
     pub parameters: Cow<'a, SurfaceParameters>,
 }
 
-/// A point of the smooth, convex and opaque surface that a flat triangle stands for, relative to the triangle's.
-/// Light that grazes the smooth surface would be below the triangle and leave black facets at a shadow's edge:
-/// its rays start from the smooth surface (Hanika 2021, *Hacking the Shadow Terminator*, Ray Tracing Gems II).
-/// Other rays start from the triangle. Zero where the surface is flat, concave or lets light through.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Lift {
-    /// Metres along the geometric normal, at least 0.
-    pub height: f32,
-    /// Sine between the smooth normal and the geometric one, in `[0, MAX_TILT]`.
-    pub tilt: f32,
+/// What of a point says where its rays begin.
+#[derive(Debug, Clone, Copy)]
+pub struct Sides {
+    /// [`SurfacePoint::geometric_normal`].
+    pub geometric_normal: Vec3,
+    /// Unit normal that light is scattered by.
+    pub shading_normal: Vec3,
+    /// [`SurfacePoint::lift`].
+    pub lift: f32,
 }
 
-impl Lift {
-    /// Whether a direction of this cosine with the geometric normal is above the surface.
-    pub fn is_above(self, cosine: f32) -> bool {
-        cosine > -self.tilt
+impl Sides {
+    /// Whether a direction points to the viewer's side of the surface.
+    pub fn is_above(&self, direction: Vec3) -> bool {
+        self.geometric_normal.dot(direction) > self.horizon()
     }
 
-    /// Whether rays in a direction of this cosine start from the smooth surface.
-    pub fn lifts(self, cosine: f32) -> bool {
-        cosine <= 0.0 && self.is_above(cosine)
-    }
-
-    /// Where a ray from `position` begins that has this cosine with the unit `geometric_normal`.
-    pub fn origin_toward(self, position: Vec3, geometric_normal: Vec3, cosine: f32) -> Vec3 {
-        if self.lifts(cosine) {
-            offset_origin(position + self.height * geometric_normal, geometric_normal)
-        } else {
-            offset_origin(position, if cosine > 0.0 { geometric_normal } else { -geometric_normal })
+    /// Greatest cosine with the geometric normal of directions that are not above the surface.
+    fn horizon(&self) -> f32 {
+        if self.lift <= 0.0 {
+            return 0.0;
         }
+        let cosine = self.geometric_normal.dot(self.shading_normal);
+        -(1.0 - cosine * cosine).max(0.0).sqrt().min(MAX_TILT)
+    }
+
+    /// Whether rays in this direction start from the smooth shape and not from the triangle.
+    pub fn lifts(&self, direction: Vec3) -> bool {
+        let cosine = self.geometric_normal.dot(direction);
+        cosine <= 0.0 && cosine > self.horizon()
+    }
+
+    /// Where a ray in this direction begins that leaves the point at `position`.
+    pub fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
+        let normal = self.geometric_normal;
+        if self.lifts(direction) {
+            return offset_origin(position + self.lift * normal, normal);
+        }
+        let is_in_front = normal.dot(direction) > 0.0;
+        offset_origin(position, if is_in_front { normal } else { -normal })
     }
 }
 
@@ -273,7 +285,7 @@ impl<'a> SurfacePoint<'a> {
             Some(normals) if is_opaque => {
                 corner.lift(position, normals, unmapped, geometric_normal)
             }
-            _ => Lift::default(),
+            _ => 0.0,
         };
         if parameters.anisotropy > 0.0 {
             let world = corner.anisotropy_direction(unmapped);
@@ -300,7 +312,7 @@ impl<'a> SurfacePoint<'a> {
     }
 }
 
-/// Whether any triangle of a scene has a [`Lift`] somewhere.
+/// Whether any triangle of a scene stands for a smooth shape ([`SurfacePoint::lift`]).
 pub(crate) fn lifts(scene: &Scene) -> bool {
     let may_be_opaque = |m: &Material| {
         let factors = [
@@ -428,22 +440,19 @@ impl<'a> Corner<'a> {
         Some(self.placing.map_or(normals, |placing| normals.map(|n| placing.normal(n))))
     }
 
-    /// Where the smooth surface is above the triangle: each corner's tangent plane lifts the point to itself
-    /// where it is higher, and the three points are blended.
-    fn lift(&self, position: Vec3, normals: [Vec3; 3], smooth: Vec3, geometric: Vec3) -> Lift {
-        let tilt = tilt(smooth, geometric);
-        if tilt < MIN_TILT {
-            return Lift::default();
+    /// Height of the smooth shape over the triangle: each corner's tangent plane lifts the point to itself where it
+    /// is higher, and the three points are blended.
+    fn lift(&self, position: Vec3, normals: [Vec3; 3], smooth: Vec3, geometric: Vec3) -> f32 {
+        if tilt(smooth, geometric) < MIN_TILT {
+            return 0.0;
         }
         let side = 1.0_f32.copysign(smooth.dot(geometric));
         let corners = self.positions();
-        let heights = [0, 1, 2].map(|i| {
+        self.blend([0, 1, 2].map(|i| {
             let normal = normals[i] * side;
             let below = (-normal.dot(position - corners[i])).max(0.0);
             below * normal.dot(geometric).max(0.0) / normal.length_squared()
-        });
-        let height = self.blend(heights);
-        if height > 0.0 { Lift { height, tilt: tilt.min(MAX_TILT) } } else { Lift::default() }
+        }))
     }
 
     /// The normal a tangent-space map makes of `normal`, not of unit length. Neither normal nor

@@ -8,11 +8,11 @@ use crate::app::theme;
 use crate::denoise::Denoiser;
 use crate::tone::{DAYLIGHT_KELVIN, KELVIN, TINT, ToneCurve, WhiteBalance};
 
-/// Draws the settings.
+/// Draws the settings, given the automatic exposure in stops and what maximum of bounces takes of the picture.
 pub(in crate::app) fn show(
     ui: &mut Ui,
     document: &mut Document,
-    exposure_ev: Option<f32>,
+    (exposure_ev, cut_off): (Option<f32>, Option<&str>),
     commands: &mut Vec<Command>,
 ) {
     theme::heading(ui, "DEVELOP");
@@ -21,8 +21,11 @@ pub(in crate::app) fn show(
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
     theme::section(ui, "LIGHT");
-    let bounces = theme::slider(&mut document.light.bounces, 0..=32);
+    let bounces = theme::slider(&mut document.light.bounces, 0..=64);
     theme::set(ui, "Bounces", "Maximum number of bounces; 1 is direct light", bounces);
+    if let Some(sentence) = cut_off {
+        ui.weak(sentence);
+    }
     let seed = theme::number(&mut document.light.seed, 0..=u32::MAX);
     theme::set(ui, "Seed", "Of the random numbers; the same one gives the same picture", seed);
     theme::section(ui, "SIZE");

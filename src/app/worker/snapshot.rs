@@ -120,6 +120,8 @@ pub(crate) struct Snapshot {
     pub backdrop: Option<Backdrop>,
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
     pub cached_seconds: f64,
+    /// A sentence where paths end with much of their light left.
+    pub cut_off: Option<Arc<str>>,
     /// Whoever shows it says here when the next one will be wanted.
     pub(in crate::app) rest: Arc<PublishThrottle>,
 }

@@ -15,7 +15,7 @@ use crate::light_grid::LearningGrid;
 use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
-use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
+use crate::render::{Gi, Phase, Sampling, Session, StopRule, View, cut_off_notice};
 
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
@@ -29,6 +29,8 @@ pub(super) struct PictureTask<'a> {
     counters: Option<Arc<LearningGrid>>,
     /// Whether a cached picture would help.
     suits_cached: bool,
+    /// A sentence where paths end with much of their light left.
+    cut_off: Option<Arc<str>>,
     /// Seconds spent on the cached picture.
     cached_seconds: f64,
     /// When what was published last, and when there may be something new.
@@ -79,8 +81,11 @@ impl<'a> PictureTask<'a> {
     pub(super) fn new(sessions: Sessions<'a>, preview: &'a mut Preview) -> Self {
         let request = &sessions.watch.request;
         preview.begin(request);
+        let Request { world, environment, view, moving, .. } = &**request;
+        let cut_off = if *moving { None } else { cut_off_notice(world, environment, view) };
         Self {
-            suits_cached: !request.moving && suits(&request.world, &request.view),
+            suits_cached: !moving && suits(world, view),
+            cut_off: cut_off.map(Arc::from),
             sessions,
             preview,
             inspection: Inspection::default(),
@@ -454,6 +459,7 @@ impl<'a> PictureTask<'a> {
             counters: self.counters.clone(),
             backdrop: self.preview.backdrop(&request, activity, main.samples(), cached),
             cached_seconds: self.cached_seconds,
+            cut_off: self.cut_off.clone(),
             cache: self.inspection.cache_facts(
                 cached.session().unwrap_or(main),
                 &request,

@@ -43,6 +43,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
         cache: Err(NoCache::Unasked),
         curves: [Vec::new(), Vec::new()],
         backdrop: None,
+        cut_off: None,
         cached_seconds: 0.0,
         rest: Arc::new(PublishThrottle::new()),
     }

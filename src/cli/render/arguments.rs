@@ -143,7 +143,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) table: TableKind,
     /// Vertices, on surfaces and in fog, at which a path gathers light; 1 is direct light only, 0 lamps
     /// and the map alone.
-    #[arg(long, default_value = "8", value_parser = values::whole::<u32>(0..=PathLimits::MAX_BOUNCES), value_name = "N", help_heading = "Light")]
+    #[arg(long, default_value_t = PathLimits::default().bounces, value_parser = values::whole::<u32>(0..=PathLimits::MAX_BOUNCES), value_name = "N", help_heading = "Light")]
     pub(super) bounces: u32,
     /// Never end dim paths at random.
     #[arg(long, help_heading = "Light")]

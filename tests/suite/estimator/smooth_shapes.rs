@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use lightgrid::path::World;
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, View};
-use lightgrid::scene::surface::{Lift, SurfacePoint};
+use lightgrid::scene::surface::SurfacePoint;
 use lightgrid::scene::{Camera, Material, Scene};
 
 use super::scenes::{black, lambert, orthographic, pane, smooth_ball, sunlight};
@@ -61,16 +61,16 @@ fn points(scene: &Scene) -> impl Iterator<Item = SurfacePoint<'_>> {
 }
 
 #[test]
-fn rays_start_no_higher_than_the_smooth_surface_and_only_from_outside() {
+fn rays_are_lifted_by_twice_the_depth_of_a_chord_and_only_outside() {
     let ball = smooth_ball(&lambert(0.8), FEW);
     let mut lifted = 0;
     for point in points(&ball) {
-        let start = point.position + point.lift.height * point.geometric_normal;
-        // A sphere through the corners, within what a quadratic patch is off.
-        assert!(start.length() < 1.01, "{point:?}");
+        let start = point.position + point.lift * point.geometric_normal;
+        // Where tangent planes lift a chord's point, it is as far outside of the sphere as it was inside.
+        assert!(start.length() < 2.0 - point.position.length() + 1e-3, "{point:?}");
         let is_outside = point.geometric_normal.dot(point.position) > 0.0;
-        assert!(is_outside || point.lift == Lift::default(), "{point:?}");
-        lifted += u32::from(point.lift.height > 0.0);
+        assert!(is_outside || point.lift == 0.0, "{point:?}");
+        lifted += u32::from(point.lift > 0.0);
     }
     // All that is seen from outside, but where a smooth normal is the triangle's.
     assert!(lifted > 800, "only {lifted} points");
@@ -86,7 +86,7 @@ fn what_is_flat_or_clear_starts_rays_from_its_triangles() {
     let [a, b, c] = parallel.triangles[0].map(|i| parallel.positions[i as usize]);
     parallel.normals = vec![(b - a).cross(c - a).normalize(); parallel.positions.len()];
     for scene in [flat, parallel, smooth_ball(&pane(), FEW)] {
-        assert!(points(&scene).all(|point| point.lift == Lift::default()));
+        assert!(points(&scene).all(|point| point.lift == 0.0));
     }
 }
 

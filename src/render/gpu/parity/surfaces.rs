@@ -9,7 +9,7 @@ use super::scattering::expect_parameters;
 use super::twin::{EXACT, Twin, ulps};
 use crate::bvh::Ray;
 use crate::path::Receiver;
-use crate::scene::surface::{SurfacePoint, alpha_at};
+use crate::scene::surface::{Sides, SurfacePoint, alpha_at};
 use crate::scene::texture::sample_texture;
 use crate::scene::{Scene, TextureRef};
 
@@ -99,7 +99,7 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
             "let triangle = take_word(); let barycentric = take2();
             let point = surface_at(triangle, barycentric, take3());
             put3(point.position); put3(point.geometric_normal); put_bool(point.front_face);
-            put2(vec2f(point.lift.height, point.lift.tilt));
+            put(point.lift);
             put3(point.shading_frame.x); put3(point.shading_frame.z);
             put_parameters(point.parameters);",
             cases(edges(), case_of),
@@ -112,8 +112,7 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
                     if triangle < own { 1.0 } else { 8.0 / height(scene.corners(triangle)) };
                 t.near(point.geometric_normal, ulps(8.0).of(turned));
                 t.same(point.front_face);
-                t.near(point.lift.height, ulps(64.0).of(turned));
-                t.near(point.lift.tilt, ulps(64.0).of(turned));
+                t.near(point.lift, ulps(64.0).of(turned));
                 t.near(point.shading_frame.x, ulps(256.0).of(turned));
                 t.near(point.shading_frame.z, ulps(256.0).of(turned));
                 expect_parameters(t, &point.parameters, ulps(256.0).of(1.0));
@@ -133,10 +132,12 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
             move |t| {
                 let (triangle, barycentric, seen) = (t.take_word(), t.take2(), t.take3());
                 let point = SurfacePoint::at(scene, triangle, barycentric, seen);
-                let cosine = point.geometric_normal.dot(t.take3());
-                t.same(point.lift.is_above(cosine));
-                let origin =
-                    point.lift.origin_toward(point.position, point.geometric_normal, cosine);
+                let (geometric_normal, lift) = (point.geometric_normal, point.lift);
+                let shading_normal = point.shading_frame.z;
+                let sides = Sides { geometric_normal, shading_normal, lift };
+                let direction = t.take3();
+                t.same(sides.is_above(direction));
+                let origin = sides.origin_toward(point.position, direction);
                 t.near(origin, ulps(64.0).of(4.0));
             },
         )
