@@ -389,12 +389,16 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     point.geometric_normal = select(-front_normal, front_normal, point.front_face);
     point.triangle = triangle;
     point.material = corner.material;
+    let unmapped = smooth_normal(normals, w, front_normal);
+//#if LIFTED
+    // Early, so that the corners need no registers later.
+    let lift = lift_of(point, mat3x3f(a, b, c), normals, w, unmapped);
+//#end
     let uvs = corner_uvs(corner, a1.zw * w.x + b1.zw * w.y + c1.zw * w.z);
     let textures = read_textures(corner, uvs);
     point.parameters = corner_parameters(corner, textures);
 
     let to_viewer = -ray_direction;
-    let unmapped = smooth_normal(normals, w, front_normal);
     let scales = material_numbers(corner.material, SCALES_FLAGS);
     var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL], scales.y);
     normal = turned(normal, unmapped, point.geometric_normal, to_viewer);
@@ -406,9 +410,7 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
 //#end
     point.shading_frame = frame_from_z(normalize(normal));
 //#if LIFTED
-    if is_opaque(point.parameters) {
-        point.lift = lift_of(point, mat3x3f(a, b, c), normals, w, unmapped);
-    }
+    point.lift = select(0.0, lift, is_opaque(point.parameters));
 //#end
 //#if ANISOTROPY
     if point.parameters.anisotropy > 0.0 {
