@@ -25,10 +25,10 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
     if is_smooth(i.ggx) {
         return r;
     }
-    if p.metallic > 0.0 {
+    if p.metallic > 0.0 || p.ior == 0.0 {
         let terms = terms_mean(i.ggx, p.roughness);
         r.inverse_mean = 1.0 / max(1.0 - (terms.x + terms.y), RESCATTER_MIN_LOSS);
-        r.reflected = metal_color(p.base_color, terms) * p.metallic;
+        r.reflected = metals_color(p, terms);
     }
 //#if SPREADING_GLASS
     if i.glass.share > 0.0 && !transmits_delta(i) {
@@ -53,6 +53,17 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
     r.through = select(0.0, through / (importance(r.reflected) + through), through > 0.0);
 //#end
     return r;
+}
+
+// The same of all that reflects as a metal does.
+fn metals_color(p: SurfaceParameters, mean: vec2f) -> vec3f {
+    var color = metal_color(p.base_color, mean) * p.metallic;
+    if p.ior == 0.0 {
+        let opaque = (1.0 - p.metallic) * (1.0 - p.transmission);
+        let share = p.specular * opaque * (1.0 - p.base_color);
+        color += metal_color(min(p.specular_color, vec3f(1.0)), mean) * share;
+    }
+    return color;
 }
 
 // What leaves of light that a metal scatters twice or more.

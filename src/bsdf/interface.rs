@@ -150,9 +150,9 @@ impl Interface {
         self.ggx.is_smooth()
     }
 
-    /// Whether there is metal that is no mirror.
+    /// Whether there is metal that is no mirror, or what an infinite index makes one (specular-glossiness).
     pub(super) fn is_rough_metal(&self, p: &SurfaceParameters) -> bool {
-        p.metallic > 0.0 && !self.is_smooth()
+        (p.metallic > 0.0 || p.ior == 0.0) && !self.is_smooth()
     }
 
     /// The glass, if it is spread on its way through.

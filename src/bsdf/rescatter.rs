@@ -83,7 +83,7 @@ impl Rescatter {
         let mut near = Loss::of(Albedo::Mirrors(terms));
         let mut far = near;
         let mut reflected = match is_metal {
-            true => metal_color(p.base_color, terms.mean()) * p.metallic,
+            true => metals_color(p, terms.mean()),
             false => Vec3::ZERO,
         };
         let mut transmitted = Vec3::ZERO;
@@ -171,7 +171,19 @@ impl Loss {
 /// Halfway between along and across the axis.
 const FRAC: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
-/// What leaves of light that a metal scatters twice or more, by its F0 and the mean albedo terms.
+/// What leaves of light that is scattered twice or more by metal, and by a dielectric of infinite index.
+fn metals_color(p: &SurfaceParameters, mean: Vec2) -> Vec3 {
+    let mut color = metal_color(p.base_color, mean) * p.metallic;
+    if p.ior == 0.0 {
+        let opaque = (1.0 - p.metallic) * (1.0 - p.transmission);
+        let f0 = p.specular_color.min(Vec3::ONE);
+        // The diffuse base has its share of what the reflection loses.
+        color += metal_color(f0, mean) * (p.specular * opaque) * (1.0 - p.base_color);
+    }
+    color
+}
+
+/// What leaves of light that a metal of this F0 scatters twice or more, by the mean albedo terms.
 fn metal_color(f0: Vec3, mean: Vec2) -> Vec3 {
     let escapes = mean.element_sum();
     // Cosine-weighted mean of Schlick's Fresnel.

@@ -220,7 +220,7 @@ impl SceneNeeds {
             (S::UNLIT, m.unlit),
             (S::EMITTERS, is_emitter(m)),
             (S::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
-            (S::ROUGH_METALS, is_rough && m.metallic > 0.0),
+            (S::ROUGH_METALS, is_rough && (m.metallic > 0.0 || m.ior == 0.0)),
             (S::ROUGH_GLASS, is_rough && m.transmission > 0.0),
             (S::CLEAR_SOLIDS, m.is_clear_solid()),
             (S::PERFECT_INTERFACES, m.may_be_smooth()),

@@ -61,7 +61,7 @@ pub(super) fn read_part(
     }
     part.colors = source.colors(&vertices, tally)?;
     source.influences(&vertices, &mut part)?;
-    source.tangents(&vertices, &mut part)?;
+    source.tangents(&vertices, &mut part, tally)?;
     source.morph(&vertices, targets, weights, &mut part, tally)?;
     // Non-finite corners would spread through the tangents of a whole part.
     let before = part.triangles.len();

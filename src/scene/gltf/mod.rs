@@ -363,6 +363,7 @@ fn repairs(tally: &Tally) -> Vec<String> {
         dropped_triangles,
         bad_normals,
         bad_values,
+        short_attributes,
         copied_instances,
         copied_triangles,
     } = tally;
@@ -380,6 +381,10 @@ fn repairs(tally: &Tally) -> Vec<String> {
         ),
         (bad_normals, "unusable vertex normals were ignored: shading is flat there"),
         (bad_values, "texture coordinates or colours that are not finite were replaced"),
+        (
+            short_attributes,
+            "normals, tangents, texture coordinates or colours with too few elements were left out",
+        ),
         (copied_instances, "instances were left out: each is a copy of another in the same place"),
         (copied_triangles, "triangles were left out: each is a copy of another in the same place"),
     ] {

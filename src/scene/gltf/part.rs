@@ -58,6 +58,7 @@ pub(super) struct Tally {
     pub(super) dropped_triangles: usize,
     pub(super) bad_normals: usize,
     pub(super) bad_values: usize,
+    pub(super) short_attributes: usize,
     pub(super) copied_instances: usize,
     pub(super) copied_triangles: usize,
 }

@@ -107,6 +107,23 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// An attribute that shading can do without: one that is too short is counted and left out.
+    fn optional(
+        &self,
+        semantic: &Semantic,
+        types: &[Type],
+        tally: &mut Tally,
+    ) -> Fallible<Option<Elements<'a>>> {
+        let Some(&accessor) = self.primitive.attributes.get(&Checked::Valid(semantic.clone()))
+        else {
+            return Ok(None);
+        };
+        let elements = open(self.file, self.draco.as_ref(), semantic, accessor, types)?;
+        let is_short = elements.count < self.positions.count;
+        tally.short_attributes += usize::from(is_short);
+        Ok((!is_short).then_some(elements))
+    }
+
     fn per_vertex(
         &self,
         accessor: json::Index<json::Accessor>,
@@ -170,7 +187,7 @@ impl<'a> Source<'a> {
         part: &mut Part,
         tally: &mut Tally,
     ) -> Fallible<()> {
-        let Some(elements) = self.attribute(&Semantic::Normals, &[Type::Vec3])? else {
+        let Some(elements) = self.optional(&Semantic::Normals, &[Type::Vec3], tally)? else {
             return Ok(());
         };
         for &vertex in vertices {
@@ -183,7 +200,9 @@ impl<'a> Source<'a> {
 
     /// A set of texture coordinates; empty if there is none.
     pub(super) fn uvs(&self, vertices: &[u32], set: u32, tally: &mut Tally) -> Fallible<Vec<Vec2>> {
-        let Some(elements) = self.attribute(&Semantic::TexCoords(set), &[Type::Vec2])? else {
+        // Some exporters write the third coordinate of volume textures.
+        let types = [Type::Vec2, Type::Vec3];
+        let Some(elements) = self.optional(&Semantic::TexCoords(set), &types, tally)? else {
             return Ok(Vec::new());
         };
         let read =
@@ -194,7 +213,7 @@ impl<'a> Source<'a> {
     /// Linear colours with alpha; empty if there are none.
     pub(super) fn colors(&self, vertices: &[u32], tally: &mut Tally) -> Fallible<Vec<Vec4>> {
         let types = [Type::Vec3, Type::Vec4];
-        let Some(elements) = self.attribute(&Semantic::Colors(0), &types)? else {
+        let Some(elements) = self.optional(&Semantic::Colors(0), &types, tally)? else {
             return Ok(Vec::new());
         };
         let elements = elements.with_fractions();
@@ -209,8 +228,13 @@ impl<'a> Source<'a> {
     }
 
     /// Tangents of the file; without normals they mean nothing (section 3.7.2.1).
-    pub(super) fn tangents(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
-        let elements = self.attribute(&Semantic::Tangents, &[Type::Vec4])?;
+    pub(super) fn tangents(
+        &self,
+        vertices: &[u32],
+        part: &mut Part,
+        tally: &mut Tally,
+    ) -> Fallible<()> {
+        let elements = self.optional(&Semantic::Tangents, &[Type::Vec4], tally)?;
         if let Some(elements) = elements.filter(|_| !part.normals.is_empty()) {
             let tangents = vertices.iter().map(|&vertex| {
                 let tangent = Vec4::from_array(elements.floats(vertex as usize));

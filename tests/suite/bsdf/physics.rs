@@ -134,6 +134,9 @@ fn lossless_surfaces_lose_nothing() {
     let smooth = |p| SurfaceParameters { roughness: 0.0, ..p };
     let rough = |roughness, p| SurfaceParameters { roughness, ..p };
     let brushed = SurfaceParameters { anisotropy: 0.6, ..METAL };
+    // What specular-glossiness becomes.
+    let chalk = SurfaceParameters { ior: 0.0, ..PLASTIC };
+    let silver = SurfaceParameters { base_color: Vec3::ZERO, ..chalk };
     for wo in viewers() {
         for entering in [true, false] {
             for (name, parameters, count, tolerance) in [
@@ -141,6 +144,8 @@ fn lossless_surfaces_lose_nothing() {
                 ("metal of roughness 0.5", METAL, 40_000, 0.01),
                 ("metal of roughness 0.75", rough(0.75, METAL), 40_000, 0.01),
                 ("metal of roughness 1", rough(1.0, METAL), 40_000, 0.01),
+                ("silver of infinite index", rough(0.75, silver), 40_000, 0.01),
+                ("chalk of infinite index", rough(0.75, chalk), 40_000, 0.01),
                 ("brushed metal", brushed, 40_000, 0.03),
                 ("brushed rough metal", rough(0.8, brushed), 40_000, 0.03),
                 ("frosted glass", rough(0.3, GLASS), 40_000, 0.01),

@@ -73,6 +73,34 @@ fn sparse_accessors_replace_elements() {
     assert_eq!(scene.triangles.len(), 1);
 }
 
+/// assimp writes the third coordinate of volume textures, and others attributes without elements.
+#[test]
+fn third_coordinates_and_short_attributes_are_left_out() {
+    let with = |kind: &str, values: &[f32], name: &str| {
+        let mut builder = square();
+        let accessor = builder.floats(kind, values);
+        let attribute = format!(r#""POSITION":0,"{name}":{accessor}"#);
+        builder.load(&ONE_MESH.replace(r#""POSITION":0"#, &attribute))
+    };
+    let volume = with("VEC3", &[0., 0., 9., 1., 0., 9., 1., 1., 9., 0., 1., 9.], "TEXCOORD_0");
+    let plain = with("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.], "TEXCOORD_0");
+    assert_eq!(volume.uvs, plain.uvs);
+    assert_eq!(volume.uvs[0].len(), 4);
+
+    for (kind, values, name) in [
+        ("VEC3", &[0.0_f32, 0., 1.][..], "NORMAL"),
+        ("VEC4", &[1., 0., 0., 1.], "TANGENT"),
+        ("VEC2", &[0.5, 0.5], "TEXCOORD_0"),
+        ("VEC4", &[1., 0., 0., 1.], "COLOR_0"),
+    ] {
+        let scene = with(kind, values, name);
+        assert_eq!(scene.triangles.len(), 2);
+        let said = scene.notices.iter().any(|notice| notice.contains("too few elements"));
+        assert!(said, "{name}: {:?}", scene.notices);
+        assert!(scene.normals.is_empty() || scene.normals.iter().all(|n| *n == Vec3::ZERO));
+    }
+}
+
 #[test]
 fn a_mirroring_node_turns_the_winding_and_keeps_normals_outside() {
     let mut builder = square();
