@@ -130,6 +130,13 @@ impl<'de> Visitor<'de> for Check<'_> {
     }
 }
 
+/// A whole number of an extension, also if it is written `4.0`.
+pub(super) fn whole(value: &Value) -> Option<u64> {
+    let mut value = value.clone();
+    make_whole(&mut value);
+    value.as_u64()
+}
+
 /// Makes whole numbers that are written `4.0` whole, but for those in what others keep there.
 pub(super) fn make_whole(value: &mut Value) {
     /// Beyond this, not every whole number is an `f64`.

@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 
 use super::buffers::File;
 use super::document::Document;
+use super::lenient::make_whole;
 use super::limits::Fallible;
 use super::medium;
 use super::textures::{Decoded, Wanted};
@@ -133,7 +134,9 @@ impl From<&json::material::NormalTexture> for Info {
 
 /// A JSON value as one of glTF's types, if it fits.
 fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
-    json::deserialize::from_value(value.clone()).ok()
+    let mut value = value.clone();
+    make_whole(&mut value);
+    json::deserialize::from_value(value).ok()
 }
 
 /// Reads one material.

@@ -12,6 +12,7 @@ use serde_json::Value;
 use super::accessor::Elements;
 use super::buffers::File;
 use super::document::Document;
+use super::lenient::whole;
 use super::limits::Fallible;
 use super::objects::Objects;
 use crate::error::Notices;
@@ -300,7 +301,7 @@ pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<V
     let open = |name: &str, kind| match attributes.get(name) {
         None => Ok(None),
         Some(index) => {
-            let index = index.as_u64().ok_or_else(nonsense)?;
+            let index = whole(index).ok_or_else(nonsense)?;
             let index = Index::new(u32::try_from(index).unwrap_or(u32::MAX));
             Elements::open(file, index, &[kind]).map(Some)
         }

@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use super::buffers::{File, uri_of};
 use super::document::Document;
+use super::lenient::whole;
 use super::limits::Fallible;
 use super::uri::{self, Place};
 use crate::error::Notices;
@@ -217,7 +218,7 @@ impl Shelf {
 /// Number of the image that an extension prefers to the texture's own.
 fn image_of(texture: &json::Texture) -> Option<u32> {
     let all = &texture.extensions.as_ref()?.others;
-    let source = |name| u32::try_from(all.get(name)?.get("source")?.as_u64()?).ok();
+    let source = |name| u32::try_from(whole(all.get(name)?.get("source")?)?).ok();
     source("KHR_texture_basisu").or_else(|| source("EXT_texture_webp"))
 }
 

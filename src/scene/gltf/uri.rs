@@ -63,6 +63,8 @@ impl Folder<'_> {
                     found.insert(file.clone());
                     return Ok(Place::File(file));
                 }
+                // Few files have a name with an escape in it.
+                Err(_) if !failure.is_empty() && candidate.contains('%') => {}
                 Err(cause) => failure = cause,
             }
         }
@@ -102,8 +104,8 @@ fn resolved(path: &Path) -> Fallible<PathBuf> {
     fs::canonicalize(path).map_err(|e| read_cause(&e))
 }
 
-/// Names of files that a URI may mean, in the order in which they are looked for: as it is written, then
-/// without `?query` and `#fragment`; each also with slashes for the backslashes of programs on Windows.
+/// Names of files that a URI may mean, in the order in which they are looked for: decoded, then without `?query` and
+/// `#fragment`, each also with slashes for the backslashes of programs on Windows; last, as it is written.
 fn file_names(uri: &str) -> Fallible<Vec<String>> {
     let path = uri.split(['?', '#']).next().unwrap_or_default();
     let mut names = Vec::new();
@@ -112,6 +114,9 @@ fn file_names(uri: &str) -> Fallible<Vec<String>> {
             .map_err(|_| format!("`{}` is not UTF-8", shown(uri)))?;
         let with_slashes = name.replace('\\', "/");
         names.extend([name, with_slashes]);
+    }
+    if uri.contains('%') {
+        names.push(uri.to_owned());
     }
     names.retain(|name| !name.is_empty());
     names.dedup();
@@ -199,7 +204,7 @@ pub(super) fn shown(uri: &str) -> String {
 
 fn read_data_uri(uri: &str) -> Fallible<Vec<u8>> {
     let (kind, payload) = uri.split_once(',').ok_or("a data URI has no comma before its data")?;
-    let coding = kind.rsplit_once(';').map(|(_, coding)| coding);
+    let coding = kind.rsplit_once(';').map(|(_, coding)| coding.trim());
     if coding.is_some_and(|coding| coding.eq_ignore_ascii_case("base64")) {
         base64_decoded(payload.as_bytes()).ok_or_else(|| "a data URI is not valid base64".into())
     } else {
@@ -295,6 +300,7 @@ mod tests {
         let read = |uri: &'static str| nowhere.place(uri.into()).and_then(|place| place.read());
         assert_eq!(read("data:text/plain,a%00b").unwrap(), b"a\0b");
         assert_eq!(read("DATA:image/png;BASE64,Zm9v").unwrap(), b"foo");
+        assert_eq!(read("data:image/png; base64,Zm9v").unwrap(), b"foo");
         assert!(read("data:nothing").unwrap_err().contains("comma"));
         assert!(read("https://example.org/a.bin").unwrap_err().contains("nothing is fetched"));
         assert_eq!(read("").unwrap_err(), "its URI is empty");

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::document::Document;
+use super::lenient::whole;
 use super::limits::Fallible;
 use super::objects::{Objects, members};
 use crate::error::Notices;
@@ -76,7 +77,7 @@ fn mapped(primitive: &json::mesh::Primitive, variant: u64) -> Option<u64> {
     let mappings = extension.get("mappings")?.as_array()?;
     let mapping = mappings.iter().find(|mapping| {
         let variants = mapping.get("variants").and_then(Value::as_array);
-        variants.is_some_and(|all| all.iter().any(|number| number.as_u64() == Some(variant)))
+        variants.is_some_and(|all| all.iter().any(|number| whole(number) == Some(variant)))
     })?;
-    mapping.get("material")?.as_u64()
+    whole(mapping.get("material")?)
 }

@@ -348,6 +348,28 @@ fn a_volume_on_a_sheet_is_a_thin_tinted_wall() {
     assert_eq!(leaf.base_color, Vec4::ONE);
 }
 
+/// Some writers know one kind of number.
+#[test]
+fn whole_numbers_of_extensions_may_have_a_point() {
+    let material = |index: &str| {
+        let mut builder = square();
+        let uvs = builder.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.]);
+        let mesh =
+            ONE_MESH.replace(r#""POSITION":0"#, &format!(r#""POSITION":0,"TEXCOORD_0":{uvs}"#));
+        let mesh = mesh.replace(r#""indices":1"#, r#""indices":1,"material":0"#);
+        let sheen = format!(
+            r#""extensions":{{"KHR_materials_sheen":{{"sheenColorFactor":[1,1,1],"sheenColorTexture":{{"index":{index}}}}}}}"#
+        );
+        let rest = format!(
+            r#""extensionsUsed":["KHR_materials_sheen"],{},{mesh}"#,
+            textured_material(&sheen, "{}")
+        );
+        builder.load(&rest).materials[0].texture(TextureSlot::SheenColor).copied()
+    };
+    assert!(material("0").is_some());
+    assert_eq!(material("0.0"), material("0"));
+}
+
 #[test]
 fn extensions_required_used_and_honoured() {
     let error = square().error(&format!(
