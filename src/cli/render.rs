@@ -69,10 +69,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
     arguments.check_fog(&world.scene, &mut notices);
-    let view = arguments.view(&world, camera.clone());
-    if let Some(sentence) = cut_off_notice(&world, &environment, &view) {
-        notices.add(sentence);
-    }
+    let cut_off = cut_off_notice(&world, &environment, &arguments.view(&world, camera.clone()));
+    cut_off.into_iter().for_each(|sentence| notices.add(sentence));
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
     memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;

@@ -1,9 +1,5 @@
 //! When paths end that could go on: the most vertices, and Russian roulette.
 
-use super::{Path, PathTracer};
-use crate::bvh::Ray;
-use crate::sampler::Sampler;
-
 /// What bounds a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PathLimits {
@@ -46,57 +42,4 @@ pub(crate) struct CutOff {
     pub(crate) by_bounces: f32,
     /// After [`MAX_INTERFACES`].
     pub(crate) by_interfaces: f32,
-}
-
-impl PathTracer<'_> {
-    /// What limits take of a camera path.
-    pub(crate) fn cut_off(&self, ray: Ray, sampler: Sampler) -> CutOff {
-        let mut path = Path::new(self, ray, sampler);
-        let mut own_bsdf = None;
-        while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
-            let carried = path.throughput.max_element();
-            if !path.counts_vertex() {
-                return CutOff { by_bounces: carried, by_interfaces: 0.0 };
-            }
-            if !path.scatter(&vertex) || !path.survives() {
-                return CutOff::default();
-            }
-        }
-        let is_caught = path.interfaces > MAX_INTERFACES;
-        let by_interfaces = if is_caught { path.throughput.max_element() } else { 0.0 };
-        CutOff { by_bounces: 0.0, by_interfaces }
-    }
-}
-
-impl Path<'_> {
-    /// Counts a vertex; `false` if the path may have no more of them.
-    pub(super) fn counts_vertex(&mut self) -> bool {
-        if self.bounces == self.tracer.limits.bounces {
-            return false;
-        }
-        self.bounces += 1;
-        self.interfaces = 0;
-        true
-    }
-
-    /// Russian roulette.
-    pub(super) fn survives(&mut self) -> bool {
-        let Some(probability) = self.survival() else { return false };
-        self.throughput /= probability;
-        true
-    }
-
-    /// With which probability the path has survived; `None` if it has not. By throughput, as it would
-    /// be in air: refraction into a body is no loss.
-    pub(super) fn survival(&mut self) -> Option<f32> {
-        let is_young = self.bounces + self.interfaces < ROULETTE_AFTER;
-        if !self.tracer.limits.russian_roulette || is_young {
-            return Some(1.0);
-        }
-        let in_air = self.throughput.max_element() * self.body.squared_index;
-        let carried = self.throughput_before * in_air;
-        let probability = (ROULETTE_MILDNESS * carried).clamp(MIN_SURVIVAL, 1.0);
-        let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
-        survives.then_some(probability)
-    }
 }

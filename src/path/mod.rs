@@ -112,6 +112,24 @@ impl PathTracer<'_> {
         path.result()
     }
 
+    /// What limits take of a camera path.
+    pub(crate) fn cut_off(&self, ray: Ray, sampler: Sampler) -> CutOff {
+        let mut path = Path::new(self, ray, sampler);
+        let mut own_bsdf = None;
+        while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
+            let carried = path.throughput.max_element();
+            if !path.counts_vertex() {
+                return CutOff { by_bounces: carried, by_interfaces: 0.0 };
+            }
+            if !path.scatter(&vertex) || !path.survives() {
+                return CutOff::default();
+            }
+        }
+        let is_caught = path.interfaces > MAX_INTERFACES;
+        let by_interfaces = if is_caught { path.throughput.max_element() } else { 0.0 };
+        CutOff { by_bounces: 0.0, by_interfaces }
+    }
+
     /// Where the cells lie: what is counted and what was learned have the same ones.
     fn cells(&self) -> Option<&SphericalGrid> {
         self.counts.map(|counts| &counts.grid).or(self.grid.and_then(LightGrid::grid))
@@ -543,5 +561,36 @@ impl<'a> Path<'a> {
             is_refracted: false,
         };
         self.map_samples = 1;
+    }
+
+    /// Counts a vertex; `false` if the path may have no more of them.
+    fn counts_vertex(&mut self) -> bool {
+        if self.bounces == self.tracer.limits.bounces {
+            return false;
+        }
+        self.bounces += 1;
+        self.interfaces = 0;
+        true
+    }
+
+    /// Russian roulette.
+    fn survives(&mut self) -> bool {
+        let Some(probability) = self.survival() else { return false };
+        self.throughput /= probability;
+        true
+    }
+
+    /// With which probability the path has survived; `None` if it has not. By throughput, as it would
+    /// be in air: refraction into a body is no loss.
+    fn survival(&mut self) -> Option<f32> {
+        let is_young = self.bounces + self.interfaces < ROULETTE_AFTER;
+        if !self.tracer.limits.russian_roulette || is_young {
+            return Some(1.0);
+        }
+        let in_air = self.throughput.max_element() * self.body.squared_index;
+        let carried = self.throughput_before * in_air;
+        let probability = (ROULETTE_MILDNESS * carried).clamp(MIN_SURVIVAL, 1.0);
+        let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
+        survives.then_some(probability)
     }
 }
