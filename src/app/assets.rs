@@ -11,7 +11,7 @@ use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
 use crate::path::framing;
-use crate::scene::{CameraPlace, Material};
+use crate::scene::{Camera, CameraPlace, Material};
 use crate::sources;
 
 /// A map turned and scaled.
@@ -192,18 +192,27 @@ pub(super) fn viewpoint_at(scene: &LoadedScene, place: &CameraPlace) -> Viewpoin
 
 /// Through the scene's first camera, or of all of it where there is none.
 pub(super) fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
-    let own = scene.world.scene.cameras.first().cloned();
-    let is_framed = own.is_none();
-    let camera = own.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
+    match scene.world.scene.cameras.first() {
+        Some(own) => viewpoint_through(scene, own, false),
+        None => framed_viewpoint(scene),
+    }
+}
+
+/// Of all of the scene; of a room from inside.
+pub(super) fn framed_viewpoint(scene: &LoadedScene) -> Viewpoint {
+    viewpoint_through(scene, &framing::frame(&scene.world, 16.0 / 9.0), true)
+}
+
+fn viewpoint_through(scene: &LoadedScene, camera: &Camera, is_framed: bool) -> Viewpoint {
     let (low, high) = scene.world.bvh.bounds();
     let eye = Vec3::from(camera.world_from_camera.translation);
     let is_outside = !(eye.cmpge(low) & eye.cmple(high)).all();
     // What is framed from outside is turned about its middle, not about what is seen first or behind it.
     let distance = match is_framed && is_outside {
         true => camera.focus_distance,
-        false => pivot_distance(scene, &camera),
+        false => pivot_distance(scene, camera),
     };
-    let mut viewpoint = Viewpoint::of(&camera, distance);
+    let mut viewpoint = Viewpoint::of(camera, distance);
     if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
         viewpoint.focus_distance = distance;
     }
@@ -211,7 +220,7 @@ pub(super) fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
 }
 
 /// Metres to what is in the middle of a camera's picture.
-fn pivot_distance(scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
+fn pivot_distance(scene: &LoadedScene, camera: &Camera) -> f32 {
     let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
     let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
     let (low, high) = scene.world.bvh.bounds();

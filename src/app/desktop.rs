@@ -8,10 +8,12 @@ use rfd::{AsyncFileDialog, FileHandle};
 use winit::window::Window;
 
 use super::commands::Command;
+use super::dropped::is_map;
 use super::interface::{Interface, Purpose};
 use super::settings_file::Settings;
 use super::tasks::{TaskResult, Tasks};
 use crate::error::Decoded;
+use crate::sources;
 
 /// Where the method was published.
 pub(super) const METHOD: &str = "https://dl.acm.org/doi/10.1145/3214745.3214808";
@@ -152,6 +154,9 @@ impl Purpose {
     /// What to do with the path.
     pub fn command(self, path: &str) -> Command {
         match self {
+            // What the file is counts, not by which line it was chosen.
+            Self::Scene if is_map(path) => Command::OpenMap(path.to_owned()),
+            Self::Map if sources::is_scene(path) => Command::OpenScene(path.to_owned()),
             Self::Scene => Command::OpenScene(path.to_owned()),
             Self::Map => Command::OpenMap(path.to_owned()),
             Self::Picture => Command::Save(path.into()),
@@ -164,6 +169,16 @@ impl Purpose {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_map_is_opened_as_one_by_either_dialogue_and_so_is_a_scene() {
+        for purpose in [Purpose::Scene, Purpose::Map] {
+            assert_eq!(purpose.command("/a/sky.HDR"), Command::OpenMap("/a/sky.HDR".to_owned()));
+            assert_eq!(purpose.command("a.glb"), Command::OpenScene("a.glb".to_owned()));
+        }
+        // Any picture may light a scene.
+        assert_eq!(Purpose::Map.command("a.jpg"), Command::OpenMap("a.jpg".to_owned()));
+    }
 
     #[test]
     fn a_dialogue_that_never_came_is_told_from_one_that_was_closed() {

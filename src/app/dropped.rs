@@ -25,15 +25,18 @@ impl Dropped {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
         let (scenes, others): (Vec<_>, Vec<_>) =
             names.into_iter().partition(|name| sources::is_scene(name));
-        let is_linear =
-            |name: &String| matches!(extension(Path::new(name)).as_deref(), Some("exr" | "hdr"));
         let has_scene = !scenes.is_empty();
         // What else comes with a scene is read with it.
-        let maps = others.into_iter().filter(|name| !has_scene || is_linear(name));
+        let maps = others.into_iter().filter(|name| !has_scene || is_map(name));
         let (mut scenes, mut maps) = (scenes.into_iter(), maps);
         let (scene, map) = (scenes.next(), maps.next());
         Self { scene, map, left: scenes.chain(maps).collect() }
     }
+}
+
+/// Whether a file is named as one of linear radiance, which can only be a map.
+pub(super) fn is_map(name: &str) -> bool {
+    matches!(extension(Path::new(name)).as_deref(), Some("exr" | "hdr"))
 }
 
 /// Files dropped onto the window: one scene and one map of them are opened. With a scene come files that belong

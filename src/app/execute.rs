@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::application::App;
+use super::assets::framed_viewpoint;
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
 use super::interface::{Chosen, Purpose, Tab};
@@ -21,6 +22,7 @@ use super::worker::{Activity, Origin, Reference, Snapshot};
 use super::{convergence, desktop, save, surface_map, theme};
 
 use crate::image::{Image, read_picture};
+use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
 use crate::scene::builtin;
 use crate::sources;
@@ -68,8 +70,15 @@ impl App {
             Command::Bookmark => self.library.bookmark(document),
             Command::ForgetBookmark(index) => self.library.forget_bookmark(document, index),
             Command::FrameAll => {
-                let bounds = self.assets.scene.as_ref().map(|scene| scene.world.bvh.bounds());
-                frame(&mut document.viewpoint, bounds, interface.aspect());
+                let scene = self.assets.scene.as_ref();
+                // From outside, walls would hide a room.
+                match scene.filter(|scene| framing::is_room(&scene.world)) {
+                    Some(room) => document.viewpoint = Some(framed_viewpoint(room)),
+                    None => {
+                        let bounds = scene.map(|scene| scene.world.bvh.bounds());
+                        frame(&mut document.viewpoint, bounds, interface.aspect());
+                    }
+                }
             }
             Command::FrameSelected => {
                 let bounds = self.selected_bounds();

@@ -86,6 +86,20 @@ fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
 }
 
 #[test]
+fn all_of_a_room_is_framed_from_inside_and_of_an_object_from_outside() {
+    for (scene, is_inside) in [("office", true), ("materials", false)] {
+        let Some(mut studio) = studio(scene) else { return };
+        studio.settle().expect("rendered");
+        let document = &mut studio.app.edited.document;
+        document.viewpoint.as_mut().expect("a camera").fly(glam::Vec3::new(0.0, 0.0, -1.0));
+        studio.asks(Command::FrameAll);
+        let eye = studio.app.edited.document.viewpoint.as_ref().expect("framed").eye();
+        let (low, high) = studio.app.assets.scene.as_ref().expect("read").world.bvh.bounds();
+        assert_eq!((eye.cmpge(low) & eye.cmple(high)).all(), is_inside, "{scene}: {eye}");
+    }
+}
+
+#[test]
 fn a_size_without_memory_is_refused_and_undo_goes_on() {
     const HUGE: PictureSize = PictureSize::Fixed(16_384, 8_192);
     if memory::check((16_384 * 8_192) * edited::BYTES_PER_PIXEL).is_ok() {

@@ -22,8 +22,12 @@ const MAX_CROSSINGS: u32 = 1 << 19;
 /// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
 /// from outside, a little from above and the right, filling the picture.
 pub fn frame(world: &World, aspect: f32) -> Camera {
-    let is_room = !is_dense(world) && share_inside(world) > SHARE_INSIDE;
-    if is_room { inside(world) } else { outside(world, aspect) }
+    if is_room(world) { inside(world) } else { outside(world, aspect) }
+}
+
+/// Whether a scene is looked at from inside.
+pub fn is_room(world: &World) -> bool {
+    !is_dense(world) && share_inside(world) > SHARE_INSIDE
 }
 
 /// Directions that cover the sphere about evenly.

@@ -129,11 +129,11 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 35] = [
     ("alarm", 49),
-    ("app", 11040),
+    ("app", 11080),
     ("bench", 594),
     ("bsdf", 1417),
     ("bvh", 1358),
-    ("cli", 3430),
+    ("cli", 3440),
     ("color", 25),
     ("denoise", 1300),
     ("develop", 468),

@@ -91,14 +91,25 @@ fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
         marks.extend(values.map(|v| GridMark { value: v.log10(), step_size: 1.0 }));
         return marks;
     }
+    let numbered = numbered(high - low);
     for decade in (low.floor() as i32)..=(high.ceil() as i32) {
         for step in 1..10 {
             let value = f64::from(decade) + f64::from(step).log10();
-            let step_size = if step == 1 { 1.0 } else { 0.1 };
+            // The plot leaves out numbers of steps that are narrow on the screen.
+            let step_size = if numbered.contains(&step) { 1.0 } else { 0.1 };
             marks.push(GridMark { value, step_size });
         }
     }
     marks
+}
+
+/// The steps of a decade that have numbers, where so many decades are shown.
+fn numbered(span: f64) -> &'static [i32] {
+    match span {
+        span if span < 0.8 => &[1, 2, 3, 4, 6, 8],
+        span if span < 1.6 => &[1, 2, 5],
+        _ => &[1],
+    }
 }
 
 /// What is written at a grid line: at as many as there is room for.
@@ -107,14 +118,9 @@ fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
     if !WRITTEN.contains(&((mark.value - range.start()) / span)) {
         return String::new();
     }
-    let written: &[i32] = match span {
-        span if span < 0.8 => &[1, 2, 3, 4, 6, 8],
-        span if span < 2.5 => &[1, 2, 5],
-        _ => &[1],
-    };
     let value = 10_f64.powf(mark.value);
     let leading = value / 10_f64.powf((mark.value + 1e-6).floor());
-    if span >= NARROW && !written.contains(&(leading.round() as i32)) {
+    if span >= NARROW && !numbered(span).contains(&(leading.round() as i32)) {
         return String::new();
     }
     let text = theme::figure(value * factor);
@@ -172,8 +178,10 @@ mod tests {
         let bounds = (low.log10(), high.log10());
         let marks = grid_lines(bounds);
         let range = bounds.0..=bounds.1;
+        // The plot shows no number of a narrow step.
         let inside = marks.into_iter().filter(|mark| range.contains(&mark.value));
-        inside.map(|mark| tick(mark, &range, 1.0)).filter(|text| !text.is_empty()).collect()
+        let wide = inside.filter(|mark| mark.step_size >= 1.0);
+        wide.map(|mark| tick(mark, &range, 1.0)).filter(|text| !text.is_empty()).collect()
     }
 
     #[test]
@@ -185,6 +193,8 @@ mod tests {
         assert_eq!(written(30.99, 31.41).len(), 5);
         assert_eq!(written(1e-4, 0.2), ["0.0001", "0.001", "0.01", "0.1"]);
         // What lies at the very end would be cut off, and what lies beyond it over something else.
-        assert_eq!(written(0.9, 101.0), ["1", "2", "5", "10", "20", "50"]);
+        assert_eq!(written(0.9, 31.0), ["1", "2", "5", "10", "20"]);
+        // A dock as low as it opens, where nothing was written.
+        assert_eq!(written(22.0, 75.0), ["30", "40", "60"]);
     }
 }
