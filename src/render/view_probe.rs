@@ -88,13 +88,13 @@ pub(crate) fn cut_off_notice(
     let CutOff { by_bounces, by_interfaces } = cut_off(world, environment, view);
     let share = by_bounces.max(by_interfaces);
     let (what, remedy) = if by_bounces > by_interfaces {
-        (format!("{} bounces", view.limits.bounces), ": more bounces show it")
+        (format!("{} bounces", view.limits.bounces), "; more bounces show it")
     } else {
         (format!("{MAX_INTERFACES} perfect reflections and refractions in a row"), "")
     };
     let percent = 100.0 * share;
     (share >= MIN_CUT_OFF).then(|| {
-        format!("the picture lacks light: paths end after {what} with {percent:.0} % of theirs left{remedy}")
+        format!("paths end after {what} with {percent:.0} % of their light left, which the picture lacks{remedy}")
     })
 }
 
