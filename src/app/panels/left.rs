@@ -366,7 +366,8 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: &Scene) {
             // Of the file's metres.
             let mut mean = frame.length(value.element_sum() / 3.0);
             let slider = theme::slider(&mut mean, 0.0..=10.0).logarithmic(true);
-            let slider = slider.smallest_positive(1e-5).suffix(" /m").max_decimals(5);
+            // More digits would be wider than the panel.
+            let slider = slider.smallest_positive(1e-4).max_decimals(4);
             let response = ui.add(slider);
             holds |= response.dragged() || response.has_focus();
             if response.changed() {
