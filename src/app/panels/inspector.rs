@@ -15,7 +15,7 @@ use crate::environment::sun::Sun;
 /// Axes that surfaces face.
 const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
 /// Tiles listed in the table.
-const LISTED: usize = 6;
+const LISTED: usize = 8;
 
 /// Draws the map view and the inspector.
 pub(in crate::app) fn show(
@@ -148,6 +148,20 @@ fn tiles(
             + (Vec2::new(sun.texel[0] as f32, sun.texel[1] as f32) + Vec2::splat(0.5)) * scale;
         ui.painter_at(rect).circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
     }
+    choose_tile(ui, interface, (rect, response), size, shares);
+    if !shares.is_empty() {
+        color_bar::show(ui, (MIN_SHARE, most), true, percent);
+    }
+}
+
+/// Marks the chosen tile and names the one under the pointer, which a click chooses.
+fn choose_tile(
+    ui: &Ui,
+    interface: &mut Interface,
+    (rect, response): (Rect, Response),
+    size: (u32, u32),
+    shares: &[f32],
+) {
     // A smaller map has fewer.
     if let Some(tile) = interface.tile.filter(|tile| *tile < size.0 * size.1) {
         mark(ui, map_view::tile_rect(rect, size, tile), theme::ACCENT);
@@ -165,9 +179,6 @@ fn tiles(
             tile % size.0,
             percent(share)
         ));
-    }
-    if !shares.is_empty() {
-        color_bar::show(ui, (MIN_SHARE, most), true, percent);
     }
 }
 
@@ -223,14 +234,16 @@ fn cell(
     let most = truth.map_or(0.0, |truth| largest(&truth.shares));
     let most = most.max(largest(&inspected.probabilities));
     if !inspected.probabilities.is_empty() {
-        let (rect, _) = map_view::ground(ui, map);
+        let (rect, response) = map_view::ground(ui, map);
         heatmap(ui, rect, size, &inspected.probabilities, most);
+        choose_tile(ui, interface, (rect, response), size, &inspected.probabilities);
         color_bar::show(ui, (MIN_SHARE, most), true, percent);
         ui.label(theme::quiet("Probability of each tile, learned"));
     }
     if let Some(truth) = truth {
-        let (rect, _) = map_view::ground(ui, map);
+        let (rect, response) = map_view::ground(ui, map);
         heatmap(ui, rect, size, &truth.shares, most);
+        choose_tile(ui, interface, (rect, response), size, &truth.shares);
         let pairs = truth.shares.iter().zip(&inspected.probabilities);
         let distance: f32 = pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum();
         ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
@@ -348,11 +361,20 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     });
 }
 
-/// The likeliest tiles in numbers.
+/// The tiles that are listed: the likeliest ones, or those whose learned probability differs most from the truth.
+fn listed(learned: &[f32], truth: Option<&[f32]>) -> Vec<usize> {
+    let weight =
+        |tile: &usize| truth.map_or(learned[*tile], |truth| (learned[*tile] - truth[*tile]).abs());
+    let mut tiles: Vec<usize> = (0..learned.len()).filter(|tile| weight(tile) > 0.0).collect();
+    tiles.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+    tiles.truncate(LISTED);
+    tiles
+}
+
+/// The likeliest tiles in numbers; once the truth is measured, those that are farthest from it.
 fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
-    let mut tiles: Vec<usize> = (0..inspected.probabilities.len()).collect();
-    tiles.sort_by(|a, b| inspected.probabilities[*b].total_cmp(&inspected.probabilities[*a]));
     let truth = inspector.truth();
+    let tiles = listed(&inspected.probabilities, truth.map(|truth| &truth.shares[..]));
     Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
         for name in ["Tile", "Share", "Tries", "Ratio"] {
             ui.label(theme::quiet(name));
@@ -361,11 +383,8 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
             ui.label(theme::quiet("Truth"));
         }
         ui.end_row();
-        for tile in tiles.into_iter().take(LISTED) {
+        for tile in tiles {
             let p = inspected.probabilities[tile];
-            if p <= 0.0 {
-                break;
-            }
             let mut number = |text: String| ui.label(RichText::new(text).size(12.5));
             number(tile.to_string());
             number(percent(p));
@@ -393,5 +412,17 @@ fn percent(share: f32) -> String {
         p if p >= 0.01 => format!("{p:.2} %"),
         p if p > 0.0 => format!("{p:.0e} %"),
         _ => "0 %".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_learning_has_missed_is_listed_first() {
+        let learned = [0.88, 0.0, 0.12, 0.0];
+        assert_eq!(listed(&learned, None), [0, 2]);
+        assert_eq!(listed(&learned, Some(&[0.42, 0.23, 0.12, 0.23])), [0, 1, 3]);
     }
 }
