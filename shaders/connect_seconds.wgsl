@@ -34,6 +34,7 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
         return vec4f(0.0);
     }
 //#if LIFTED
+    // Connections start from the vertex.
     if lifts(vertex.point, direction) {
         return vec4f(0.0);
     }

@@ -55,7 +55,7 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
     return r;
 }
 
-// The same of all that reflects as a metal does.
+// Twin of `metals_color`: what leaves of light that metal, and a dielectric of infinite index, scatters again.
 fn metals_color(p: SurfaceParameters, mean: vec2f) -> vec3f {
     var color = metal_color(p.base_color, mean) * p.metallic;
     if p.ior == 0.0 {

@@ -1,4 +1,4 @@
-//! When paths end that could go on: the most vertices, and Russian roulette.
+//! When paths end that could go on: maximum of vertices, and Russian roulette.
 
 /// What bounds a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -308,6 +308,7 @@ impl Second<'_, '_> {
             if !(cosine > 0.0 && squared > 0.0) {
                 continue;
             }
+            // Connections start from the vertex.
             if first.vertex.scatterer.lifts(direction) {
                 continue;
             }
