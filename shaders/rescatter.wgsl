@@ -55,7 +55,8 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
     return r;
 }
 
-// Twin of `metals_color`: what leaves of light that metal, and a dielectric of infinite index, scatters again.
+// What leaves of light that is scattered twice or more by metal, and by a dielectric of infinite
+// index.
 fn metals_color(p: SurfaceParameters, mean: vec2f) -> vec3f {
     var color = metal_color(p.base_color, mean) * p.metallic;
     if p.ior == 0.0 {
