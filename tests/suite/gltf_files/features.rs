@@ -80,7 +80,10 @@ fn third_coordinates_and_short_attributes_are_left_out() {
         let mut builder = square();
         let accessor = builder.floats(kind, values);
         let attribute = format!(r#""POSITION":0,"{name}":{accessor}"#);
-        builder.load(&ONE_MESH.replace(r#""POSITION":0"#, &attribute))
+        let mesh = ONE_MESH.replace(r#""POSITION":0"#, &attribute);
+        let mesh = mesh.replace(r#""indices":1"#, r#""indices":1,"material":0"#);
+        let painted = r#""pbrMetallicRoughness":{"baseColorTexture":{"index":0}}"#;
+        builder.load(&format!("{},{mesh}", textured_material(painted, "{}")))
     };
     let volume = with("VEC3", &[0., 0., 9., 1., 0., 9., 1., 1., 9., 0., 1., 9.], "TEXCOORD_0");
     let plain = with("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.], "TEXCOORD_0");
