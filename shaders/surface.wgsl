@@ -457,7 +457,7 @@ fn origin_toward(point: SurfacePoint, direction: vec3f) -> vec3f {
 }
 
 //#if LIFTED
-// Twin of `Sides::horizon`.
+// Twin of `Sides::of`.
 fn horizon_of(geometric_normal: vec3f, shading_normal: vec3f, lift: f32) -> f32 {
     let cosine = dot(geometric_normal, shading_normal);
     let tilt = min(sqrt(max(1.0 - cosine * cosine, 0.0)), MAX_TILT);

@@ -57,7 +57,7 @@ use crate::medium::Fog;
 use crate::radiance_cache::RadianceCache;
 use crate::sampler::Sampler;
 use crate::scene::needs::SceneFeatures;
-use crate::scene::surface::SurfacePoint;
+use crate::scene::surface::{Sides, SurfacePoint};
 
 /// All that a path reads.
 #[derive(Clone, Copy)]
@@ -442,7 +442,7 @@ impl<'a> Path<'a> {
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
             geometric_normal: point.geometric_normal,
-            lift: point.lift,
+            sides: Sides::of(point),
             shading_frame: point.shading_frame,
             bsdf: bsdf.viewed_from(wo),
             behind: material.behind(point),

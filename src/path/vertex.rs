@@ -55,8 +55,7 @@ pub(super) struct MediumScatterer {
 
 pub(super) struct SurfaceScatterer<'v> {
     pub(super) geometric_normal: Vec3,
-    /// [`SurfacePoint::lift`](crate::scene::surface::SurfacePoint::lift).
-    pub(super) lift: f32,
+    pub(super) sides: Sides,
     pub(super) shading_frame: Frame,
     /// Towards where the path came from, in the shading frame.
     pub(super) bsdf: ViewedBsdf<'v>,
@@ -86,7 +85,7 @@ impl Scatterer<'_> {
     /// Whether rays in this direction do not start from the vertex itself ([`Sides::lifts`]).
     pub(super) fn lifts(&self, direction: Vec3) -> bool {
         match self {
-            Self::Surface(surface) => surface.sides().lifts(direction),
+            Self::Surface(surface) => surface.sides.lifts(direction),
             Self::Medium(_) => false,
         }
     }
@@ -147,17 +146,12 @@ impl<'v> SurfaceScatterer<'v> {
 
     /// Whether a direction points to the side that the path came from.
     pub(super) fn is_above(&self, direction: Vec3) -> bool {
-        self.sides().is_above(direction)
+        self.sides.is_above(direction)
     }
 
     /// Where a ray from `position` in this direction begins.
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
-        self.sides().origin_toward(position, direction)
-    }
-
-    fn sides(&self) -> Sides {
-        let Self { geometric_normal, shading_frame, lift, .. } = *self;
-        Sides { geometric_normal, shading_normal: shading_frame.z, lift }
+        self.sides.origin_toward(position, direction)
     }
 }
 

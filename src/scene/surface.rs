@@ -190,33 +190,34 @@ pub struct SurfacePoint<'a> {
 /// What of a point says where its rays begin.
 #[derive(Debug, Clone, Copy)]
 pub struct Sides {
-    /// [`SurfacePoint::geometric_normal`].
-    pub geometric_normal: Vec3,
-    /// Unit normal that light is scattered by.
-    pub shading_normal: Vec3,
-    /// [`SurfacePoint::lift`].
-    pub lift: f32,
+    geometric_normal: Vec3,
+    lift: f32,
+    /// Greatest cosine with the geometric normal of directions that are not above the surface.
+    horizon: f32,
 }
 
 impl Sides {
-    /// Whether a direction points to the viewer's side of the surface.
-    pub fn is_above(&self, direction: Vec3) -> bool {
-        self.geometric_normal.dot(direction) > self.horizon()
+    /// Those of a point.
+    pub fn of(point: &SurfacePoint<'_>) -> Self {
+        let (geometric_normal, lift) = (point.geometric_normal, point.lift);
+        let horizon = if lift > 0.0 {
+            let cosine = geometric_normal.dot(point.shading_frame.z);
+            -(1.0 - cosine * cosine).max(0.0).sqrt().min(MAX_TILT)
+        } else {
+            0.0
+        };
+        Self { geometric_normal, lift, horizon }
     }
 
-    /// Greatest cosine with the geometric normal of directions that are not above the surface.
-    fn horizon(&self) -> f32 {
-        if self.lift <= 0.0 {
-            return 0.0;
-        }
-        let cosine = self.geometric_normal.dot(self.shading_normal);
-        -(1.0 - cosine * cosine).max(0.0).sqrt().min(MAX_TILT)
+    /// Whether a direction points to the viewer's side of the surface.
+    pub fn is_above(&self, direction: Vec3) -> bool {
+        self.geometric_normal.dot(direction) > self.horizon
     }
 
     /// Whether rays in this direction start from the smooth shape and not from the triangle.
     pub fn lifts(&self, direction: Vec3) -> bool {
         let cosine = self.geometric_normal.dot(direction);
-        cosine <= 0.0 && cosine > self.horizon()
+        cosine <= 0.0 && cosine > self.horizon
     }
 
     /// Where a ray in this direction begins that leaves the point at `position`.
@@ -283,7 +284,7 @@ impl<'a> SurfacePoint<'a> {
         let is_opaque = parameters.transmission <= 0.0 && parameters.diffuse_transmission <= 0.0;
         let lift = match normals {
             Some(normals) if is_opaque => {
-                corner.lift(position, normals, unmapped, geometric_normal)
+                corner.lift(position, [a, b, c], normals, unmapped, geometric_normal)
             }
             _ => 0.0,
         };
@@ -442,12 +443,19 @@ impl<'a> Corner<'a> {
 
     /// Height of the smooth shape over the triangle: each corner's tangent plane lifts the point to itself where it
     /// is higher, and the three points are blended.
-    fn lift(&self, position: Vec3, normals: [Vec3; 3], smooth: Vec3, geometric: Vec3) -> f32 {
-        if tilt(smooth, geometric) < MIN_TILT {
+    fn lift(
+        &self,
+        position: Vec3,
+        corners: [Vec3; 3],
+        normals: [Vec3; 3],
+        smooth: Vec3,
+        geometric: Vec3,
+    ) -> f32 {
+        let squared_tilt = smooth.cross(geometric).length_squared();
+        if squared_tilt < MIN_TILT * MIN_TILT * smooth.length_squared() {
             return 0.0;
         }
         let side = 1.0_f32.copysign(smooth.dot(geometric));
-        let corners = self.positions();
         self.blend([0, 1, 2].map(|i| {
             let normal = normals[i] * side;
             let below = (-normal.dot(position - corners[i])).max(0.0);

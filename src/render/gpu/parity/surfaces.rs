@@ -132,9 +132,7 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
             move |t| {
                 let (triangle, barycentric, seen) = (t.take_word(), t.take2(), t.take3());
                 let point = SurfacePoint::at(scene, triangle, barycentric, seen);
-                let (geometric_normal, lift) = (point.geometric_normal, point.lift);
-                let shading_normal = point.shading_frame.z;
-                let sides = Sides { geometric_normal, shading_normal, lift };
+                let sides = Sides::of(&point);
                 let direction = t.take3();
                 t.same(sides.is_above(direction));
                 let origin = sides.origin_toward(point.position, direction);
