@@ -231,8 +231,7 @@ impl App {
         panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
             Tab::Scene => panels::left::sections(ui, document, interface, sources, commands),
             Tab::Picture => {
-                let snapshot = self.rendering.snapshot.as_ref();
-                let cut_off = snapshot.and_then(|snapshot| snapshot.cut_off.as_deref());
+                let cut_off = self.rendering.snapshot.as_ref().and_then(|s| s.cut_off.as_deref());
                 panels::picture::show(ui, document, (exposure_ev, cut_off), commands);
                 panels::history::show(ui, history, &mut interface.compared, commands);
             }

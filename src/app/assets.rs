@@ -194,13 +194,13 @@ pub(super) fn viewpoint_at(scene: &LoadedScene, place: &CameraPlace) -> Viewpoin
 pub(super) fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
     match scene.world.scene.cameras.first() {
         Some(own) => viewpoint_through(scene, own, false),
-        None => framed_viewpoint(scene),
+        None => viewpoint_through(scene, &framing::frame(&scene.world, 16.0 / 9.0), true),
     }
 }
 
-/// Of all of the scene; of a room from inside.
-pub(super) fn framed_viewpoint(scene: &LoadedScene) -> Viewpoint {
-    viewpoint_through(scene, &framing::frame(&scene.world, 16.0 / 9.0), true)
+/// Of all of a room from inside; `None` if the scene is none.
+pub(super) fn room_viewpoint(scene: &LoadedScene) -> Option<Viewpoint> {
+    framing::frame_room(&scene.world).map(|camera| viewpoint_through(scene, &camera, true))
 }
 
 fn viewpoint_through(scene: &LoadedScene, camera: &Camera, is_framed: bool) -> Viewpoint {

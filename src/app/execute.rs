@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::application::App;
-use super::assets::framed_viewpoint;
+use super::assets::room_viewpoint;
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
 use super::interface::{Chosen, Purpose, Tab};
@@ -22,7 +22,6 @@ use super::worker::{Activity, Origin, Reference, Snapshot};
 use super::{convergence, desktop, save, surface_map, theme};
 
 use crate::image::{Image, read_picture};
-use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
 use crate::scene::builtin;
 use crate::sources;
@@ -72,12 +71,11 @@ impl App {
             Command::FrameAll => {
                 let scene = self.assets.scene.as_ref();
                 // From outside, walls would hide a room.
-                match scene.filter(|scene| framing::is_room(&scene.world)) {
-                    Some(room) => document.viewpoint = Some(framed_viewpoint(room)),
-                    None => {
-                        let bounds = scene.map(|scene| scene.world.bvh.bounds());
-                        frame(&mut document.viewpoint, bounds, interface.aspect());
-                    }
+                if let Some(inside) = scene.and_then(room_viewpoint) {
+                    document.viewpoint = Some(inside);
+                } else {
+                    let bounds = scene.map(|scene| scene.world.bvh.bounds());
+                    frame(&mut document.viewpoint, bounds, interface.aspect());
                 }
             }
             Command::FrameSelected => {

@@ -31,7 +31,8 @@ impl Path<'_> {
             && self.is_in_air()
             && surface.is_cacheable();
         if is_known {
-            let radiance = cache.radiance_over_albedo(vertex.position, surface.geometric_normal);
+            let radiance =
+                cache.radiance_over_albedo(vertex.position, surface.sides.geometric_normal);
             self.radiance += self.throughput * surface.bsdf().albedo() * radiance;
         }
         is_known
@@ -43,7 +44,7 @@ impl Path<'_> {
             return;
         }
         if let Scatterer::Surface(surface) = &vertex.scatterer {
-            let cosine = surface.geometric_normal.dot(self.ray.direction).abs();
+            let cosine = surface.sides.geometric_normal.dot(self.ray.direction).abs();
             // Of perfect reflections the density is infinite.
             self.spread += self.travelled / (self.departure.pdf_solid_angle * cosine).sqrt();
         }

@@ -22,12 +22,13 @@ const MAX_CROSSINGS: u32 = 1 << 19;
 /// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
 /// from outside, a little from above and the right, filling the picture.
 pub fn frame(world: &World, aspect: f32) -> Camera {
-    if is_room(world) { inside(world) } else { outside(world, aspect) }
+    frame_room(world).unwrap_or_else(|| outside(world, aspect))
 }
 
-/// Whether a scene is looked at from inside.
-pub fn is_room(world: &World) -> bool {
-    !is_dense(world) && share_inside(world) > SHARE_INSIDE
+/// Frames a room from inside; `None` if the scene is none.
+pub fn frame_room(world: &World) -> Option<Camera> {
+    let is_room = !is_dense(world) && share_inside(world) > SHARE_INSIDE;
+    is_room.then(|| inside(world))
 }
 
 /// Directions that cover the sphere about evenly.

@@ -247,6 +247,16 @@ impl<'a> Path<'a> {
         onward.is_some_and(|onward| self.go_on(vertex, &onward)) && self.survives()
     }
 
+    /// Counts a vertex; `false` if the path may have no more of them.
+    fn counts_vertex(&mut self) -> bool {
+        if self.bounces == self.tracer.limits.bounces {
+            return false;
+        }
+        self.bounces += 1;
+        self.interfaces = 0;
+        true
+    }
+
     /// Whether nothing has reflected, refracted or scattered it yet.
     fn is_of_camera(&self) -> bool {
         self.bounces + self.interfaces == 0
@@ -441,7 +451,6 @@ impl<'a> Path<'a> {
         let material = self.tracer.world.material(point.material);
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
-            geometric_normal: point.geometric_normal,
             sides: Sides::of(point),
             shading_frame: point.shading_frame,
             bsdf: bsdf.viewed_from(wo),
@@ -561,16 +570,6 @@ impl<'a> Path<'a> {
             is_refracted: false,
         };
         self.map_samples = 1;
-    }
-
-    /// Counts a vertex; `false` if the path may have no more of them.
-    fn counts_vertex(&mut self) -> bool {
-        if self.bounces == self.tracer.limits.bounces {
-            return false;
-        }
-        self.bounces += 1;
-        self.interfaces = 0;
-        true
     }
 
     /// Russian roulette.

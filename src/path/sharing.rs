@@ -254,7 +254,7 @@ impl SurfaceScatterer<'_> {
     /// Whether a viewer in this direction sees the normal as it is, not bent into sight
     /// ([`crate::scene::surface::SurfacePoint`]).
     fn is_true_from(&self, to_viewer: Vec3) -> bool {
-        let (normal, geometric) = (self.shading_frame.z, self.geometric_normal);
+        let (normal, geometric) = (self.shading_frame.z, self.sides.geometric_normal);
         let geometric_cos = geometric.dot(to_viewer);
         let cos = normal.dot(to_viewer);
         let mirrored = 2.0 * cos * normal.dot(geometric) - geometric_cos;
@@ -291,7 +291,7 @@ impl Second<'_, '_> {
         connections.clear();
         let position = self.vertex.position;
         let target = match scatterer {
-            Scatterer::Surface(surface) => offset_origin(position, surface.geometric_normal),
+            Scatterer::Surface(surface) => offset_origin(position, surface.sides.geometric_normal),
             Scatterer::Medium(_) => position,
         };
         let is_in_medium = matches!(scatterer, Scatterer::Medium(_));
@@ -302,7 +302,7 @@ impl Second<'_, '_> {
             let squared = to_second.length_squared();
             let direction = to_second / squared.sqrt();
             let cosine = match scatterer {
-                Scatterer::Surface(surface) => -surface.geometric_normal.dot(direction),
+                Scatterer::Surface(surface) => -surface.sides.geometric_normal.dot(direction),
                 Scatterer::Medium(_) => 1.0,
             };
             if !(cosine > 0.0 && squared > 0.0) {

@@ -69,7 +69,7 @@ impl TrainingVertex {
         trains.then(|| Self {
             vertex: path.bounces,
             position: vertex.position,
-            normal: surface.geometric_normal,
+            normal: surface.sides.geometric_normal,
             albedo: surface.bsdf().albedo(),
             throughput,
             radiance_before: path.radiance,

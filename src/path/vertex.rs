@@ -54,7 +54,6 @@ pub(super) struct MediumScatterer {
 }
 
 pub(super) struct SurfaceScatterer<'v> {
-    pub(super) geometric_normal: Vec3,
     pub(super) sides: Sides,
     pub(super) shading_frame: Frame,
     /// Towards where the path came from, in the shading frame.

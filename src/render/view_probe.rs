@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(taken.by_interfaces, 0.0);
         let notice = |world, bounces| cut_off_notice(world, &map, &view(bounces));
         assert!(notice(&white, 8).is_some_and(|said| said.contains("8 bounces with 1")));
-        // Direct light was asked for, or what is left is too little to be seen.
+        // One bounce asks for direct light; 32 leave out less than is seen.
         assert_eq!(notice(&white, 1).or(notice(&white, 32)), None);
 
         let mirror = Material { metallic: 1.0, roughness: 0.0, ..Material::lambert(0.99) };

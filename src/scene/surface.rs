@@ -190,7 +190,8 @@ pub struct SurfacePoint<'a> {
 /// What of a point says where its rays begin.
 #[derive(Debug, Clone, Copy)]
 pub struct Sides {
-    geometric_normal: Vec3,
+    /// [`SurfacePoint::geometric_normal`].
+    pub geometric_normal: Vec3,
     lift: f32,
     /// Greatest cosine with the geometric normal of directions that are not above the surface.
     horizon: f32,
@@ -327,15 +328,16 @@ pub(crate) fn lifts(scene: &Scene) -> bool {
         let vertices = scene.triangles[place].map(|i| i as usize);
         let [a, b, c] = vertices.map(|i| scene.positions[i]);
         let geometric = (b - a).cross(c - a).normalize_or_zero();
-        let tilts = |i: usize| tilt(scene.normals[i], geometric) >= MIN_TILT;
+        let tilts = |i: usize| is_tilted(scene.normals[i], geometric);
         is_opaque[scene.triangle_materials[place] as usize] && vertices.into_iter().any(tilts)
     };
     !scene.normals.is_empty() && (0..scene.triangles.len()).into_par_iter().any(is_lifted)
 }
 
-/// Sine between a normal of any length and a unit one; not a number without a direction.
-fn tilt(normal: Vec3, geometric_normal: Vec3) -> f32 {
-    normal.cross(geometric_normal).length() / normal.length()
+/// Whether the sine between a normal of any length and a unit one is above [`MIN_TILT`].
+fn is_tilted(normal: Vec3, geometric_normal: Vec3) -> bool {
+    let squared_sine = normal.cross(geometric_normal).length_squared();
+    squared_sine > MIN_TILT * MIN_TILT * normal.length_squared()
 }
 
 /// Opacity in `[0,1]` of a point: 1 if the material is opaque, 0 or 1 if it is masked, its alpha if
@@ -451,8 +453,7 @@ impl<'a> Corner<'a> {
         smooth: Vec3,
         geometric: Vec3,
     ) -> f32 {
-        let squared_tilt = smooth.cross(geometric).length_squared();
-        if squared_tilt < MIN_TILT * MIN_TILT * smooth.length_squared() {
+        if !is_tilted(smooth, geometric) {
             return 0.0;
         }
         let side = 1.0_f32.copysign(smooth.dot(geometric));

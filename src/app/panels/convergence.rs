@@ -103,7 +103,7 @@ fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
     marks
 }
 
-/// The steps of a decade that have numbers, where so many decades are shown.
+/// Multiples of a power of ten that have numbers on an axis of `span` decades.
 fn numbered(span: f64) -> &'static [i32] {
     match span {
         span if span < 0.8 => &[1, 2, 3, 4, 6, 8],

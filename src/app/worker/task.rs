@@ -1,6 +1,7 @@
 //! One request being worked on.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -29,8 +30,8 @@ pub(super) struct PictureTask<'a> {
     counters: Option<Arc<LearningGrid>>,
     /// Whether a cached picture would help.
     suits_cached: bool,
-    /// A sentence where paths end with much of their light left.
-    cut_off: Option<Arc<str>>,
+    /// A sentence where paths end with much of their light left; asked for once there is a picture.
+    cut_off: OnceCell<Option<Arc<str>>>,
     /// Seconds spent on the cached picture.
     cached_seconds: f64,
     /// When what was published last, and when there may be something new.
@@ -81,11 +82,9 @@ impl<'a> PictureTask<'a> {
     pub(super) fn new(sessions: Sessions<'a>, preview: &'a mut Preview) -> Self {
         let request = &sessions.watch.request;
         preview.begin(request);
-        let Request { world, environment, view, moving, .. } = &**request;
-        let cut_off = if *moving { None } else { cut_off_notice(world, environment, view) };
         Self {
-            suits_cached: !moving && suits(world, view),
-            cut_off: cut_off.map(Arc::from),
+            suits_cached: !request.moving && suits(&request.world, &request.view),
+            cut_off: OnceCell::new(),
             sessions,
             preview,
             inspection: Inspection::default(),
@@ -448,6 +447,7 @@ impl<'a> PictureTask<'a> {
             snapshot
         });
         let is_quick = self.sessions.device.is_quick(&request);
+        let cut_off = self.cut_off(&request, main.samples());
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {
@@ -459,7 +459,7 @@ impl<'a> PictureTask<'a> {
             counters: self.counters.clone(),
             backdrop: self.preview.backdrop(&request, activity, main.samples(), cached),
             cached_seconds: self.cached_seconds,
-            cut_off: self.cut_off.clone(),
+            cut_off,
             cache: self.inspection.cache_facts(
                 cached.session().unwrap_or(main),
                 &request,
@@ -475,6 +475,14 @@ impl<'a> PictureTask<'a> {
             let cost = (self.published - start).saturating_sub(reading);
             self.publish_gap = gap_after(cost);
         }
+    }
+
+    fn cut_off(&self, request: &Request, samples: u32) -> Option<Arc<str>> {
+        if request.moving || samples == 0 {
+            return None;
+        }
+        let notice = || cut_off_notice(&request.world, &request.environment, &request.view);
+        self.cut_off.get_or_init(|| notice().map(Arc::from)).clone()
     }
 
     fn session_snapshot(

@@ -60,6 +60,8 @@ pub(super) struct Target {
     color_0: Option<json::Index<json::Accessor>>,
 }
 
+type Found<'a> = (json::Index<json::Accessor>, Elements<'a>);
+
 /// A triangle primitive whose accessors are checked as they are read.
 pub(super) struct Source<'a> {
     file: &'a File<'a>,
@@ -99,12 +101,8 @@ impl<'a> Source<'a> {
 
     /// An attribute, which must be as long as the positions.
     fn attribute(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
-        match self.primitive.attributes.get(&Checked::Valid(semantic.clone())) {
-            Some(&accessor) => open(self.file, self.draco.as_ref(), semantic, accessor, types)
-                .and_then(|elements| self.per_vertex(accessor, elements))
-                .map(Some),
-            None => Ok(None),
-        }
+        let found = self.find(semantic, types)?;
+        found.map(|(accessor, elements)| self.per_vertex(accessor, elements)).transpose()
     }
 
     /// An attribute that shading can do without: one that is too short is counted and left out.
@@ -114,14 +112,20 @@ impl<'a> Source<'a> {
         types: &[Type],
         tally: &mut Tally,
     ) -> Fallible<Option<Elements<'a>>> {
-        let Some(&accessor) = self.primitive.attributes.get(&Checked::Valid(semantic.clone()))
-        else {
-            return Ok(None);
-        };
-        let elements = open(self.file, self.draco.as_ref(), semantic, accessor, types)?;
+        let Some((_, elements)) = self.find(semantic, types)? else { return Ok(None) };
         let is_short = elements.count < self.positions.count;
         tally.short_attributes += usize::from(is_short);
         Ok((!is_short).then_some(elements))
+    }
+
+    /// An attribute of any length, and its accessor.
+    fn find(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Found<'a>>> {
+        let accessor = self.primitive.attributes.get(&Checked::Valid(semantic.clone()));
+        let open = |&accessor| {
+            let elements = open(self.file, self.draco.as_ref(), semantic, accessor, types)?;
+            Ok((accessor, elements))
+        };
+        accessor.map(open).transpose()
     }
 
     fn per_vertex(

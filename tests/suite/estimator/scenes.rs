@@ -76,8 +76,8 @@ pub(crate) fn orthographic(eye: Vec3) -> Camera {
     }
 }
 
-/// A ball of radius 1 around the origin with the normals of a sphere, of so many rows of faces and twice as many
-/// columns; its front is outside.
+/// A ball of radius 1 around the origin with the normals of a sphere. It has `rows` rows of faces, twice as many
+/// columns, and its front outside.
 pub(crate) fn smooth_ball(material: &Material, rows: u32) -> Scene {
     let at = |row: u32, column: u32| {
         let (sin, cos) = (PI * row as f32 / rows as f32).sin_cos();
