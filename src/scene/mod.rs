@@ -7,6 +7,7 @@ mod camera;
 pub mod camera_path;
 mod contents;
 mod copies;
+mod flush;
 mod frame;
 pub mod gltf;
 mod instances;

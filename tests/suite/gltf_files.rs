@@ -4,6 +4,7 @@ pub(crate) mod builder;
 mod copies;
 mod far;
 mod features;
+mod flush;
 mod ktx2;
 mod pairs;
 

@@ -201,6 +201,7 @@ fn read_in(
         notices.add(repair);
     }
     scene.pair_backs();
+    scene.part_flush_faces();
     scene.notices = notices;
     let found = file.folder.found.lock().unwrap_or_else(PoisonError::into_inner);
     scene.files = found.iter().cloned().collect();
