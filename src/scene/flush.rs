@@ -24,15 +24,12 @@ const JUMPS: f64 = 2.5;
 const MIN_COSINE: f32 = 0.9999;
 /// Pairs that are all looked at rather than divided further.
 const FEW: usize = 64;
-/// Opaque faces under one face that are looked at: where many lie in one place, these tell.
-const MAX_UNDER: usize = 256;
+/// Opaque faces about one face that are looked at: where many lie in one place, these tell.
+const MAX_NEAR: usize = 1024;
 /// Instances are looked at one by one in scenes that show no more triangles than this; else the first of each mesh.
 const MAX_SHOWN: u64 = 1 << 25;
 /// Times that all contacts of a corner are gone through: once settles those at right angles.
 const SWEEPS: usize = 4;
-
-/// A position in the world or in a mesh, by [`Scene::owner`]: all corners there move together.
-type Place = (usize, [u32; 3]);
 
 /// A triangle with the box around it.
 #[derive(Clone, Copy)]
@@ -73,6 +70,24 @@ struct Contact {
     distance: f64,
 }
 
+/// How far corners of what lets light through move: all in one place of the world, or of a mesh, together.
+struct Moves {
+    /// The number of the place that a vertex is in.
+    places: Vec<u32>,
+    /// By place.
+    by: Vec<DVec3>,
+}
+
+impl Moves {
+    fn of(&self, vertex: u32) -> DVec3 {
+        self.by[self.places[vertex as usize] as usize]
+    }
+
+    fn at(&mut self, vertex: u32) -> &mut DVec3 {
+        &mut self.by[self.places[vertex as usize] as usize]
+    }
+}
+
 impl Scene {
     /// Moves faces that let light through off the opaque ones that they lie on: solid glass inwards, all else to the
     /// front of what they lie on. But what has one side, on something of two, moves to its own front.
@@ -92,7 +107,7 @@ impl Scene {
             return;
         }
         let passing: Vec<usize> = (0..self.triangles.len()).filter(|&at| kind(at)).collect();
-        let mut moves = self.moves(&contacts);
+        let mut moves = self.moves(&passing, &contacts);
         self.drop_inverting(&passing, &mut moves);
         self.apply(&passing, &moves);
     }
@@ -154,9 +169,12 @@ impl Scene {
 
     /// How a face must move, given opaque ones in order.
     fn contact(&self, face: &Face<'_>, opaque: &[Face<'_>]) -> Option<Contact> {
-        let near = opaque.iter().filter(|it| it.overlaps(face.low, face.high));
-        let under: Vec<Overlap> =
-            near.filter_map(|it| self.overlap(face, it)).take(MAX_UNDER).collect();
+        let is_near = |it: &&Face<'_>| {
+            let cosine = it.normal.dot(face.normal).abs();
+            it.overlaps(face.low, face.high) && cosine >= MIN_COSINE
+        };
+        let near = opaque.iter().filter(is_near).take(MAX_NEAR);
+        let under: Vec<Overlap> = near.filter_map(|it| self.overlap(face, it)).collect();
         let first = under.first()?.forwards;
         let [forwards, area] =
             [|it| it, f64::abs].map(|of| under.iter().map(|it| of(it.forwards)).sum::<f64>());
@@ -175,12 +193,12 @@ impl Scene {
         Some(Contact { triangle, direction: along / scale, distance: distance / scale })
     }
 
-    /// Where a face and an opaque one lie in one plane and over each other, if they do.
+    /// Where a face and an opaque one of a parallel plane lie in the same and over each other, if they do.
     fn overlap(&self, face: &Face<'_>, opaque: &Face<'_>) -> Option<Overlap> {
         let cosine = face.normal.dot(opaque.normal);
         let [above, below] = [face, opaque].map(|it| self.material_at(it));
         // Of a pair, each is met from its own side only.
-        if cosine.abs() < MIN_COSINE || above.backed && below.backed && cosine < 0.0 {
+        if above.backed && below.backed && cosine < 0.0 {
             return None;
         }
         let has_own_front = !above.double_sided && !above.backed && below.double_sided;
@@ -206,20 +224,24 @@ impl Scene {
         is_flush.then_some(Overlap { forwards, heights, safe: JUMPS * jump })
     }
 
-    /// The places of a triangle's corners.
-    fn places(&self, triangle: usize) -> [Place; 3] {
-        let owner = self.owner(triangle);
-        self.triangles[triangle].map(|vertex| (owner, bits(self.positions[vertex as usize])))
-    }
-
-    /// How far the corners in each place must move to bring all faces there as far as they must.
-    fn moves(&self, contacts: &[Contact]) -> HashMap<Place, DVec3> {
-        let mut moves: HashMap<Place, DVec3> = HashMap::new();
+    /// How far corners must move to bring all faces there as far as they must.
+    fn moves(&self, passing: &[usize], contacts: &[Contact]) -> Moves {
+        let corners = |&at: &usize| {
+            let owner = self.owner(at);
+            self.triangles[at].map(|it| ((owner, bits(self.positions[it as usize])), it))
+        };
+        let mut corners: Vec<_> = passing.par_iter().flat_map_iter(corners).collect();
+        corners.par_sort_unstable();
+        let mut moves = Moves { places: vec![0; self.positions.len()], by: Vec::new() };
+        for alike in corners.chunk_by(|a, b| a.0 == b.0) {
+            alike.iter().for_each(|it| moves.places[it.1 as usize] = moves.by.len() as u32);
+            moves.by.push(DVec3::ZERO);
+        }
         for _ in 0..SWEEPS {
             let mut most = 0.0_f64;
             for Contact { triangle, direction, distance } in contacts {
-                for place in self.places(*triangle) {
-                    let by = moves.entry(place).or_default();
+                for vertex in self.triangles[*triangle] {
+                    let by = moves.at(vertex);
                     let missing = (distance - by.dot(*direction)).max(0.0);
                     *by += missing * direction;
                     most = most.max(missing / distance);
@@ -233,29 +255,27 @@ impl Scene {
     }
 
     /// Takes back what would turn a triangle around: glass that is thinner than it is to move stays.
-    fn drop_inverting(&self, passing: &[usize], moves: &mut HashMap<Place, DVec3>) {
+    fn drop_inverting(&self, passing: &[usize], moves: &mut Moves) {
         let turns = |at: &usize| {
-            let old = self.triangles[*at].map(|vertex| self.positions[vertex as usize].as_dvec3());
-            let by = self.places(*at).map(|place| moves.get(&place).copied().unwrap_or_default());
-            let new = std::array::from_fn(|i| old[i] + by[i]);
-            by != [DVec3::ZERO; 3] && normal(old).dot(normal(new)) <= 0.0
+            let corners = self.triangles[*at];
+            let old = corners.map(|vertex| self.positions[vertex as usize].as_dvec3());
+            let new = std::array::from_fn(|i| old[i] + moves.of(corners[i]));
+            old != new && normal(old).dot(normal(new)) <= 0.0
         };
         let turned: Vec<usize> = passing.par_iter().copied().filter(turns).collect();
-        for place in turned.into_iter().flat_map(|at| self.places(at)) {
-            moves.remove(&place);
+        for vertex in turned.into_iter().flat_map(|at| self.triangles[at]) {
+            *moves.at(vertex) = DVec3::ZERO;
         }
     }
 
     /// Moves corners; each that does becomes a vertex of its own, since something opaque may share the old one.
-    fn apply(&mut self, passing: &[usize], moves: &HashMap<Place, DVec3>) {
+    fn apply(&mut self, passing: &[usize], moves: &Moves) {
         let mut moved: HashMap<u32, u32> = HashMap::new();
         for &at in passing {
-            let (places, corners) = (self.places(at), self.triangles[at]);
-            for (slot, (place, vertex)) in places.into_iter().zip(corners).enumerate() {
-                let Some(by) = moves.get(&place) else { continue };
-                let new = moved.entry(vertex).or_insert_with(|| self.add_moved(vertex, *by));
-                self.triangles[at][slot] = *new;
-            }
+            self.triangles[at] = self.triangles[at].map(|vertex| match moves.of(vertex) {
+                DVec3::ZERO => vertex,
+                by => *moved.entry(vertex).or_insert_with(|| self.add_moved(vertex, by)),
+            });
         }
     }
 
