@@ -606,7 +606,8 @@ mod tests {
             let world = DAffine3::from_translation(DVec3::new(0.1, 0.2, z)) * scale;
             Instance { mesh: 0, placing: Placing::new(world) }
         };
-        scene.instances = Instances::new(vec![2..14], vec![place(1.0), place(-0.2)]);
+        let meshes = std::iter::once(2..14).collect();
+        scene.instances = Instances::new(meshes, vec![place(1.0), place(-0.2)]);
         scene.part_flush_faces();
         assert!(is_closed(&scene, GLASS));
         let heights = || corners_of(&scene, GLASS).into_iter().map(|it| it.z);

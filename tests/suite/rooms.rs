@@ -157,7 +157,7 @@ const BUDGETS: [(&str, usize); 35] = [
     ("render", 6320),
     ("report", 3167),
     ("sampler", 145),
-    ("scene", 10250),
+    ("scene", 10270),
     ("shaders", 5950),
     ("sources", 119),
     ("stability", 1930),
