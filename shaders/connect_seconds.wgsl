@@ -14,12 +14,19 @@ struct Second {
 //#end
     shading_frame: Frame,
     bsdf: Bsdf,
+//#if !SHEEN
+    // What its body scatters, but for the share that leaves it.
+    diffuse: vec3f,
+//#end
 }
 
 var<workgroup> batch: array<Second, TILES_OF_GROUP * BATCH>;
 // What of a second vertex's radiance reaches a lane's pixel, and the density with which it would have
 // found that vertex.
 var<workgroup> connections: array<vec4f, 64u * BATCH>;
+// Sums of densities of some pixels of a tile that follow each other, for each second vertex of the batch.
+const SUMMED = BATCH;
+var<workgroup> partial_densities: array<f32, 64u>;
 
 // What connects a lane's first vertex with second vertex `index` of the batch.
 fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32) -> vec4f {
@@ -81,6 +88,39 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
 //#end
 }
 
+// Below which cosine to the geometric normal light comes from behind second vertex `index` of the batch.
+fn horizon_of_second(index: u32) -> f32 {
+//#if LIFTED
+    let normal = batch[index].geometric_normal;
+    return horizon_of(normal, batch[index].shading_frame.z, batch[index].lift);
+//#else
+    return 0.0;
+//#end
+}
+
+//#if !SHEEN
+// What the body of second vertex `index` of the batch scatters of the light that is kept at `at`, but for the share
+// that leaves it towards a viewer.
+fn diffuse_light_of(index: u32, at: u32) -> vec3f {
+    let body = batch[index].bsdf.diffuse;
+    var light = vec3f(0.0);
+    if diffuse_is_absent(body) {
+        return light;
+    }
+    let horizon = horizon_of_second(index);
+    for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
+        let arriving = seconds[at + 2u * i + 2u];
+        let wi = local_from_world(batch[index].shading_frame, float3(arriving));
+        let is_in_front = dot(batch[index].geometric_normal, float3(arriving)) > horizon;
+        if (wi.z > 0.0) == is_in_front && diffuse_is_seen(body, wi) {
+            let scattered_ = diffuse_eval_pdf(body, bitcast<f32>(arriving.w), wi).value;
+            light += scattered_ * float3(seconds[at + 2u * i + 3u]);
+        }
+    }
+    return light;
+}
+//#end
+
 // Radiance of second vertex `index` of the batch towards a first one.
 fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let direction = normalize(position - batch[index].position);
@@ -98,12 +138,15 @@ fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let frame = batch[index].shading_frame;
     let bsdf = batch[index].bsdf;
     let wo = local_from_world(frame, direction);
-    let out = bsdf_outgoing(bsdf, wo);
-//#if LIFTED
-    let horizon = horizon_of(batch[index].geometric_normal, frame.z, batch[index].lift);
-//#else
-    let horizon = 0.0;
+    var out = bsdf_outgoing(bsdf, wo);
+//#if !SHEEN
+    radiance = batch[index].diffuse * out.diffuse_left;
+    if interface_is_absent(bsdf.interface_) && rescatter_is_absent(bsdf.rescatter) {
+        return radiance;
+    }
+    out.diffuse_probability = 0.0;
 //#end
+    let horizon = horizon_of_second(index);
     for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
         let light = float3(seconds[at + 2u * i + 3u]);
         if any(light != vec3f(0.0)) {
@@ -180,6 +223,9 @@ fn connect_seconds(
 //#end
                 batch[lane].shading_frame = point.shading_frame;
                 batch[lane].bsdf = bsdf_new(point.parameters, point.front_face);
+//#if !SHEEN
+                batch[lane].diffuse = diffuse_light_of(lane, second_at_);
+//#end
             }
         }
         workgroupBarrier();
@@ -191,14 +237,21 @@ fn connect_seconds(
             connections[64u * i + lane] = found;
         }
         workgroupBarrier();
+        var summed = 0.0;
+        for (var m = 0u; m < SUMMED; m++) {
+            summed += connections[SUMMED * lane + m].w;
+        }
+        partial_densities[lane] = summed;
+        workgroupBarrier();
         for (var i = 0u; i < BATCH; i++) {
             let own = connections[64u * i + lane];
             if all(own.xyz == vec3f(0.0)) {
                 continue;
             }
             var density = 0.0;
-            for (var m = 0u; m < MEMBERS; m++) {
-                density += connections[64u * i + tile_in_group * MEMBERS + m].w;
+            for (var m = 0u; m < MEMBERS / SUMMED; m++) {
+                let of_tile = 64u * i + tile_in_group * MEMBERS;
+                density += partial_densities[of_tile / SUMMED + m];
             }
             let index = tile_in_group * BATCH + i;
             let second_at_ = second_at(group.x, lane, first_of_batch + i);

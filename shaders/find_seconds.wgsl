@@ -109,42 +109,59 @@ fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
     return shares;
 }
 
-@compute @workgroup_size(64)
-fn find_seconds(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    own_lane = lane;
-    let member = lane_member(group.x, lane);
-    let at = first_at(group.x, lane);
-    let kept_at = second_at(group.x, lane, member.square);
-    if !member.is_inside {
-        firsts[at] = vec4u(0u);
-        if member.is_owner {
-            seconds[kept_at] = vec4u(0u);
-        }
-        return;
-    }
-    first[0] = vec4u(0u);
-    second[0] = vec4u(0u);
-    var path = start_sample(member.place.x, member.place.y, globals.work.sample);
-    while path_step(&path) {}
+// Keeps what was found for a lane of a group, and the light of its path.
+fn keep_found(group: u32, lane: u32, path: ptr<function, Path>) {
+    let at = first_at(group, lane);
     firsts[at] = first[0];
-    firsts[at + 64u] = vec4u(first[1].xyz, path.rays);
-    firsts[at + 128u] = packed(path.radiance, 0u);
+    firsts[at + 64u] = vec4u(first[1].xyz, (*path).rays);
+    firsts[at + 128u] = packed((*path).radiance, 0u);
 //#if PERFECT_INTERFACES
     firsts[at + 192u] = packed(first_direction, 0u);
 //#end
 //#if LAYERS
-    let hit = path.first_hit;
+    let hit = (*path).first_hit;
     let looks_at = at + 64u * LOOKS_TEXEL;
     firsts[looks_at] = packed(hit.albedo, bitcast<u32>(hit.depth));
     firsts[looks_at + 64u] = packed(hit.normal, bitcast<u32>(hit.hits));
 //#end
+    let member = lane_member(group, lane);
     if member.is_owner {
+        let kept_at = second_at(group, lane, member.square);
         let is_found = second[0].w != 0u;
         seconds[kept_at] =
             vec4u(second[0].xyz, select(0u, second[0].w | (lane % MEMBERS), is_found));
         seconds[kept_at + 1u] = second[1];
+    }
+}
+
+@compute @workgroup_size(64)
+fn find_seconds(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(local_invocation_index) lane_: u32,
+) {
+    own_lane = lane_;
+    begin_items(lane_);
+    var item = lane_;
+    var path: Path;
+    var is_over = true;
+    var is_inside = true;
+    loop {
+        let group = workgroup.x * globals.work.rounds + item / 64u;
+        let lane = item % 64u;
+        if is_over {
+            if is_past_items(item, group) {
+                break;
+            }
+            let member = lane_member(group, lane);
+            first[0] = vec4u(0u);
+            second[0] = vec4u(0u);
+            path = start_sample(member.place.x, member.place.y, globals.work.sample);
+            is_inside = member.is_inside;
+        }
+        is_over = !(is_inside && path_step(&path));
+        if is_over {
+            keep_found(group, lane, &path);
+            item = next_item();
+        }
     }
 }

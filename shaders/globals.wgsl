@@ -17,7 +17,8 @@ struct Work {
     stride: u32,
     // The sample that pixels which share take; then `first` and `count` are workgroups.
     sample: u32,
-    padding_0: u32,
+    // Of such workgroups, so many do their work in one.
+    rounds: u32,
 }
 
 struct Globals {

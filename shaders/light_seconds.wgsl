@@ -1,8 +1,18 @@
 // Estimates what arrives at the second vertices that are kept, one estimate a lane.
 
-fn put_incident(at: u32, direction: vec3f, light: vec3f, rays: u32) {
+// Keeps a direction of light, and what an interface leaves of the light that the body below scatters.
+fn put_incident(at: u32, vertex: Vertex, direction: vec3f, light: vec3f, rays: u32) {
+    var left = 0.0;
+//#if !SHEEN
+    let wi = local_from_world(vertex.point.shading_frame, direction);
+    left = bsdf_diffuse_left_at(vertex.bsdf, select(-wi, wi, wi.z > 0.0));
+//#end
+    seconds[at] = packed(direction, bitcast<u32>(left));
+    put_light(at, light, rays);
+}
+
+fn put_light(at: u32, light: vec3f, rays: u32) {
     let is_valid = is_finite3(light);
-    seconds[at] = packed(direction, 0u);
     seconds[at + 1u] = packed(select(vec3f(0.0), light, is_valid), rays);
 }
 
@@ -51,18 +61,20 @@ fn unscattered_shadow(
 }
 //#end
 
-@compute @workgroup_size(64)
-fn light_seconds(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    own_lane = lane;
-    let item = group.x * 64u + lane;
+// Where the light is kept that an estimate finds on its path onwards.
+fn onward_at(group: u32, lane: u32) -> u32 {
+    let item = 64u * group + lane;
+    let incident = item % CONTINUATIONS * INCIDENTS + INCIDENTS - 1u;
+    return item / CONTINUATIONS * SECOND_TEXELS + 2u + 2u * incident;
+}
+
+// Gathers light at the vertex of an estimate. The path that goes on from there is kept in a slot.
+fn begin_estimate(group: u32, lane: u32) {
+    let slot = slot_of(group, lane);
+    slots[slot + 64u * STATE] = vec4u(0u, IS_IDLE, 0u, 0u);
+    let item = 64u * group + lane;
     let owner = item / CONTINUATIONS;
     let estimate = item % CONTINUATIONS;
-    if owner >= globals.work.count * TILES_OF_GROUP * OWNERS {
-        return;
-    }
     let at = owner * SECOND_TEXELS;
     let hit = seconds[at];
     if (hit.w & IS_FOUND) == 0u {
@@ -96,21 +108,59 @@ fn light_seconds(
         survival_ = survival(&path);
     }
     let density = path.departure_pdf_solid_angle;
-    let onwards = path.ray.direction;
     path.throughput_before *= max_element(path.throughput) / max(survival_, 1e-30);
     path.throughput = vec3f(1.0);
 //#if MAP_SAMPLING
-    put_incident(put_at, map_shadow.ray.direction, light_along(&path, map_shadow), 0u);
+    put_incident(put_at, vertex, map_shadow.ray.direction, light_along(&path, map_shadow), 0u);
     put_at += 2u;
 //#end
 //#if LOCAL_LIGHTS
-    put_incident(put_at, lamp_shadow.ray.direction, light_along(&path, lamp_shadow), 0u);
+    put_incident(put_at, vertex, lamp_shadow.ray.direction, light_along(&path, lamp_shadow), 0u);
     put_at += 2u;
 //#end
-    var light = vec3f(0.0);
+    put_incident(put_at, vertex, path.ray.direction, vec3f(0.0), path.rays);
     if survival_ > 0.0 {
-        while path_step(&path) {}
-        light = path.radiance * (1.0 / (survival_ * density * f32(CONTINUATIONS)));
+        let weight = 1.0 / (survival_ * density * f32(CONTINUATIONS));
+        write_path(slot, bitcast<u32>(weight), &path);
     }
-    put_incident(put_at, onwards, light, path.rays);
+}
+
+@compute @workgroup_size(64)
+fn light_seconds(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(local_invocation_index) lane_: u32,
+) {
+    own_lane = lane_;
+    for (var round = 0u; round < globals.work.rounds; round++) {
+        let group = workgroup.x * globals.work.rounds + round;
+        if group < globals.work.count {
+            begin_estimate(group, lane_);
+        }
+    }
+    storageBarrier();
+    begin_items(lane_);
+    var item = lane_;
+    var path: Path;
+    var is_over = true;
+    loop {
+        let group = workgroup.x * globals.work.rounds + item / 64u;
+        let lane = item % 64u;
+        let slot = slot_of(group, lane);
+        if is_over {
+            if is_past_items(item, group) {
+                break;
+            }
+            if slot_state(slot).what == IS_IDLE {
+                item = next_item();
+                continue;
+            }
+            path = read_path(slot);
+        }
+        is_over = !path_step(&path);
+        if is_over {
+            let light = path.radiance * bitcast<f32>(slot_state(slot).pixel);
+            put_light(onward_at(group, lane), light, path.rays);
+            item = next_item();
+        }
+    }
 }

@@ -90,6 +90,26 @@ fn second_at(group: u32, lane: u32, square: u32) -> u32 {
     return ((group * TILES_OF_GROUP + lane / MEMBERS) * OWNERS + square) * SECOND_TEXELS;
 }
 
+// A workgroup does the work of `globals.work.rounds` groups: each lane takes one item, and another one as soon as
+// its path has ended, so that no lane waits for the longest path.
+var<workgroup> items_taken: atomic<u32>;
+
+fn begin_items(lane: u32) {
+    if lane == 0u {
+        atomicStore(&items_taken, 64u);
+    }
+    workgroupBarrier();
+}
+
+fn next_item() -> u32 {
+    return atomicAdd(&items_taken, 1u);
+}
+
+// Whether there is no such item; it is of this group.
+fn is_past_items(item: u32, group: u32) -> bool {
+    return item >= 64u * globals.work.rounds || group >= globals.work.count;
+}
+
 fn packed(xyz: vec3f, w: u32) -> vec4u {
     return vec4u(bitcast<vec3u>(xyz), w);
 }

@@ -135,6 +135,11 @@ fn read_path(slot: u32) -> Path {
     path.is_counted = (state.y & IS_COUNTED) != 0u;
 //#end
     read_radiance(slot, &path);
+//#if SHARING
+    path.throughput_before = bitcast<f32>(slot_read(slot, HIT).x);
+    path.map_samples = 1.0;
+    path.departure_map_samples = 1.0;
+//#end
 //#if EMITTERS
     let position = slot_read(slot, RECEIVER_TEXEL);
     let normal = slot_read(slot, RECEIVER_TEXEL + 1u);
@@ -183,6 +188,10 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     slots[slot + 64u * STATE] =
         vec4u(pixel, what, (*path).passes, bitcast<u32>(squared_index));
     write_radiance(slot, path);
+//#if SHARING
+    // Its ray has hit nothing yet.
+    slot_write(slot, HIT, vec3f((*path).throughput_before, 0.0, 0.0), 0u);
+//#end
 //#if EMITTERS
     let receiver = (*path).departure_receiver;
     slot_write(slot, RECEIVER_TEXEL, receiver.position, 0u);

@@ -80,6 +80,11 @@ impl Kernel {
         Self::OF_SHARING.contains(&self)
     }
 
+    /// Whether paths wait in slots.
+    pub(super) fn keeps_paths(self) -> bool {
+        self.is_of_queue() || self == Self::LightSeconds
+    }
+
     /// Whether its paths lie in slots.
     pub(super) fn is_of_queue(self) -> bool {
         Self::OF_QUEUE.contains(&self)

@@ -34,7 +34,7 @@ pub(crate) struct Work {
     pub(crate) end_sample: u32,
     pub(crate) stride: u32,
     pub(crate) sample: u32,
-    pub(crate) padding: u32,
+    pub(crate) rounds: u32,
 }
 
 /// Twin of `Globals` in `globals.wgsl`.

@@ -239,7 +239,7 @@ impl Program {
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
         ]);
-        if kernel.is_of_queue() {
+        if kernel.keeps_paths() {
             let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure } =
                 SlotTexels::of(features);
             declare(&[
@@ -368,7 +368,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 67] {
         (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
         (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
         (wgsl!("words"), kernel.is_of_queue() || kernel.shares()),
-        (wgsl!("slots"), kernel.is_of_queue()),
+        (wgsl!("slots"), kernel.keeps_paths()),
         (wgsl!("trace"), kernel == Kernel::Trace),
         (wgsl!("shade"), kernel == Kernel::Shade),
         (wgsl!("follow_shadows"), kernel == Kernel::FollowShadows),
@@ -398,7 +398,7 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
         ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, kernel.begins_anywhere()),
         ("cache_sums", "array<atomic<u32>>", true, trains),
-        ("slots", "array<vec4u>", true, is_of_queue),
+        ("slots", "array<vec4u>", true, kernel.keeps_paths()),
         ("queue", "Queue", true, is_of_queue),
         ("firsts", "array<vec4u>", true, kernel.shares() && kernel != Kernel::LightSeconds),
         ("seconds", "array<vec4u>", true, kernel.shares()),

@@ -10,12 +10,16 @@ use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
 use super::progress::{GROUP, Progress};
+use super::texels::SlotTexels;
 use crate::error::Result;
 use crate::path::sharing::SharedTile;
 use crate::scene::needs::SceneFeatures;
 
 /// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
 const MAX_GROUPS: u64 = 4096;
+
+/// Most workgroups whose paths one follows: longer rounds gain little.
+const MAX_ROUNDS: u64 = 8;
 
 /// What a renderer keeps of pixels that share.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +51,8 @@ impl Sharing {
         let what = "the vertices that pixels share";
         buffers.make("firsts", most_groups * GROUP * 16 * first_texels, what)?;
         buffers.make("seconds", most_groups * owners * 16 * (2 + 2 * incidents), what)?;
+        let slot = SlotTexels::of(features.in_kernel(Kernel::LightSeconds, false));
+        buffers.make("slots", most_groups * GROUP * 16 * u64::from(slot.count), what)?;
         Ok(Self { tile, most_groups, next_group: 0 })
     }
 
@@ -59,6 +65,7 @@ impl Sharing {
         cancel: &AtomicBool,
     ) -> Result<()> {
         let Globals { width, height, seed, .. } = on.globals;
+        let busy_groups = on.min_tiles(u64::MAX);
         while progress.least < pass.target {
             let sample = progress.least;
             let tiling = self.tile.tiling([width, height], seed, sample);
@@ -76,6 +83,7 @@ impl Sharing {
                     count: count as u32,
                     sample,
                     stride: pass.stride,
+                    rounds: (count / busy_groups).clamp(1, MAX_ROUNDS) as u32,
                     ..Work::default()
                 };
                 on.dispatch(&Kernel::OF_SHARING, &work, count as u32, count)?;

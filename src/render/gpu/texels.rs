@@ -1,6 +1,6 @@
 //! How many texels a vertex and a slot take on the device, and what lies in which.
 
-use super::features::{Features, ViewFeatures};
+use super::features::{Features, KernelFeatures, ViewFeatures};
 use crate::scene::needs::SceneFeatures;
 
 /// Texels of a vertex: two, and one for each of these that the scene needs.
@@ -40,7 +40,7 @@ pub(crate) struct SlotTexels {
 }
 
 impl SlotTexels {
-    pub(crate) fn of(Features { scene, view, .. }: Features) -> Self {
+    pub(crate) fn of(Features { scene, view, kernel }: Features) -> Self {
         let mut count = 7;
         let mut next = |is_needed, texels| {
             let at = count;
@@ -55,8 +55,10 @@ impl SlotTexels {
         // What is asked for where a ray meets glass.
         let is_clear = scene.contains(SceneFeatures::CLEAR_SOLIDS);
         let [of_map, of_lamp] = if is_clear { [6, 8] } else { [4, 4] };
-        let map_shadow = next(view.contains(ViewFeatures::MAP_SAMPLING), of_map);
-        let lamp_shadow = next(view.contains(ViewFeatures::LOCAL_LIGHTS), of_lamp);
+        // Paths behind second vertices follow their shadows at once.
+        let waits = |light| view.contains(light) && !kernel.contains(KernelFeatures::SHARING);
+        let map_shadow = next(waits(ViewFeatures::MAP_SAMPLING), of_map);
+        let lamp_shadow = next(waits(ViewFeatures::LOCAL_LIGHTS), of_lamp);
         let departure = next(is_clear, 2);
         Self { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure }
     }

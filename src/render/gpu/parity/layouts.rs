@@ -79,7 +79,7 @@ fn assert_same(module: &Module, name: &str, (size, fields): (usize, Fields)) {
 #[test]
 fn structs_are_laid_out_as_the_host_writes_them() {
     let module = module();
-    let work = fields!(Work: first first_high count samples end_sample stride sample padding);
+    let work = fields!(Work: first first_high count samples end_sample stride sample rounds);
     assert_same(&module, "Work", work);
     let globals = fields!(Globals:
         work camera_position lens_radius camera_right focus_distance camera_up half_width camera_forward
