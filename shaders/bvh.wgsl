@@ -118,15 +118,21 @@ fn sheared(vertex: vec3f, shear: Shear) -> vec3f {
     return vec3f(v.x - shear.factors.x * v.z, v.y - shear.factors.y * v.z, v.z);
 }
 
-// On which side of the edge from `b` to `a` the ray passes. The ends are put in order first: two
-// triangles then compute the same number for their shared edge, fused or not, and a ray cannot
-// slip between them.
+// On which side of the edge from `b` to `a` the ray passes. Two triangles compute the same number for their
+// shared edge, but for its sign, and a ray cannot slip between them.
 fn edge(a: vec3f, b: vec3f) -> f32 {
+//#if FUSING
+    // Both products are rounded: then it does not matter which one a device would fuse with the difference.
+    let products = bitcast<vec2f>(bitcast<vec2u>(a.xy * b.yx) ^ vec2u(globals.zero));
+    return products.x - products.y;
+//#else
+    // The ends are put in order.
     let swap = a.x > b.x || (a.x == b.x && a.y > b.y);
     let first = select(a.xy, b.xy, swap);
     let second = select(b.xy, a.xy, swap);
     let area = first.x * second.y - first.y * second.x;
     return select(area, -area, swap);
+//#end
 }
 
 // Distance to the plane of a triangle that is far larger than the distance `rough`, whose error then

@@ -61,6 +61,9 @@ impl Dispatcher {
         if uploaded.gpu.has_hardware_rays() {
             features = features.with_hardware_rays();
         }
+        if !uploaded.gpu.facts().is_software() {
+            features = features.with_fusing();
+        }
         let mut buffers = uploaded.buffers.for_renderer();
         let mut globals = uploaded.globals;
         globals.set_view(view, rays);

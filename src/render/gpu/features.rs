@@ -66,6 +66,8 @@ bitflags::bitflags! {
         const SHARING = 1 << 5;
         /// Paths train the radiance cache.
         const TRAINING = 1 << 6;
+        /// The device may fuse products with sums.
+        const FUSING = 1 << 7;
     }
 }
 
@@ -194,6 +196,12 @@ impl Features {
     /// The same for a device whose own ray queries find what rays hit.
     pub(crate) fn with_hardware_rays(mut self) -> Self {
         self.kernel |= KernelFeatures::HARDWARE_RAYS;
+        self
+    }
+
+    /// The same for a device that may fuse products with sums, as GPUs do.
+    pub(crate) fn with_fusing(mut self) -> Self {
+        self.kernel |= KernelFeatures::FUSING;
         self
     }
 

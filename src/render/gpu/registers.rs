@@ -123,7 +123,7 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        let exact = Features::by_default(&world);
+        let exact = Features::by_default(&world).with_fusing();
         let cached = Features { view: exact.view | ViewFeatures::RADIANCE_CACHE, ..exact };
         let of_exact = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
         let of_exact = of_exact.chain(Kernel::OF_SHARING).map(|kernel| (kernel, exact, ""));
