@@ -144,6 +144,9 @@ impl Dispatcher {
 
     /// Takes kernels that are compiled.
     pub(super) fn take_up(&mut self, kernels: &[Kernel], compiled: Vec<Arc<Pipeline>>) {
+        for (kernel, pipeline) in kernels.iter().zip(&compiled) {
+            self.flights.resume(*kernel, &pipeline.last_units);
+        }
         self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
     }
 

@@ -8,7 +8,7 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::device::Gpu;
 use super::kernel::Kernel;
-use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
+use super::pacer::{LastUnits, Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
 use super::progress::GROUP;
 use crate::error::{Error, Result};
 use crate::render::gpu_facts::FlightFigures;
@@ -69,7 +69,7 @@ impl Flights {
         Self {
             under_way: VecDeque::new(),
             target_seconds,
-            pacers: [Pacer::new(target_seconds); Kernel::COUNT],
+            pacers: std::array::from_fn(|_| Pacer::new(target_seconds)),
             last_landing: Instant::now(),
             clock: Clock::new(gpu),
             staging: None,
@@ -82,6 +82,11 @@ impl Flights {
     /// Units (workgroup samples) that the next dispatch of a kernel may hold.
     pub(super) fn units(&self, kernel: Kernel) -> u64 {
         self.pacers[kernel as usize].units()
+    }
+
+    /// Lets dispatches of a kernel begin with what other pictures know of its speed.
+    pub(super) fn resume(&mut self, kernel: Kernel, last: &LastUnits) {
+        self.pacers[kernel as usize].resume(last);
     }
 
     /// What the dispatches so far took.
@@ -209,7 +214,7 @@ impl Flights {
     /// Lets dispatches begin as small as at first, so that tests can cut work short.
     #[cfg(test)]
     pub(super) fn forget_speed(&mut self) {
-        self.pacers = [Pacer::new(self.target_seconds); Kernel::COUNT];
+        self.pacers = std::array::from_fn(|_| Pacer::new(self.target_seconds));
     }
 }
 

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::sync::{Arc, Weak};
 
+use super::pacer::LastUnits;
 use super::shader::Program;
 use crate::error::Error;
 
@@ -11,6 +12,7 @@ pub(super) struct Pipeline {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) program: Program,
+    pub(super) last_units: LastUnits,
 }
 
 /// Most kernels that are kept for those who may want them again: those of some four scenes. Each is a megabyte

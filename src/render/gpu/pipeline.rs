@@ -7,6 +7,7 @@ use std::thread::ScopedJoinHandle;
 use super::device::Gpu;
 use super::kernel::Kernel;
 use super::kernel_cache::{KernelCache, Pipeline};
+use super::pacer::LastUnits;
 use super::shader::{Binding, Program};
 use crate::error::{Error, Result};
 
@@ -69,7 +70,7 @@ impl Pipeline {
             });
             (layout, pipeline)
         })?;
-        Ok(Arc::new(Self { pipeline, layout, program }))
+        Ok(Arc::new(Self { pipeline, layout, program, last_units: LastUnits::default() }))
     }
 }
 
