@@ -57,6 +57,22 @@ impl Image {
         })
     }
 
+    /// The colour at a place in pixels, whole numbers being their middles: between the four around it.
+    pub(crate) fn between(&self, place: [f32; 2]) -> [f32; 3] {
+        let size = [self.width, self.height];
+        let place: [f32; 2] =
+            std::array::from_fn(|i| place[i].clamp(0.0, size[i].saturating_sub(1) as f32));
+        let low = place.map(|place| place as u32);
+        let next: [u32; 2] = std::array::from_fn(|i| (low[i] + 1).min(size[i] - 1));
+        let part: [f32; 2] = std::array::from_fn(|i| place[i] - low[i] as f32);
+        let row = |y: u32| {
+            let [left, right] = [self.at(low[0], y), self.at(next[0], y)];
+            std::array::from_fn::<f32, 3, _>(|i| left[i] + part[0] * (right[i] - left[i]))
+        };
+        let [upper, lower] = [row(low[1]), row(next[1])];
+        std::array::from_fn(|i| upper[i] + part[1] * (lower[i] - upper[i]))
+    }
+
     /// The pixel in column `x` of row `y`.
     pub fn at(&self, x: u32, y: u32) -> [f32; 3] {
         self.pixels[y as usize * self.width as usize + x as usize]

@@ -1,6 +1,6 @@
 //! From a point on the picture to a ray.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 use crate::bvh::Ray;
 use crate::scene::{Camera, Projection};
@@ -91,6 +91,37 @@ impl CameraRays {
         }
         Ray { origin, direction: direction.normalize(), t_min: 0.0, t_max: f32::INFINITY }
     }
+
+    /// Rows that multiply a point, with 1 as its last component, or a direction, with 0: the quotients of the first two
+    /// by the third are the pixel (continuous coordinates) at which it is seen through the middle of the lens. What is
+    /// behind a perspective camera, and any direction for an orthographic one, has no positive third.
+    pub(crate) fn projection(&self) -> [Vec4; 3] {
+        let ahead = match self.orthographic {
+            true => Vec4::W,
+            false => self.row(self.up.cross(self.right)),
+        };
+        // The middle of the picture may lie off the axis.
+        let middle = if self.orthographic { Vec3::ZERO } else { self.forward };
+        let column = self.row(self.right) - ahead * middle.dot(self.right);
+        let row = ahead * middle.dot(self.up) - self.row(self.up);
+        let half = 0.5 * self.picture_size;
+        [
+            column * (half.x / self.half_extent.x) + ahead * half.x,
+            row * (half.y / self.half_extent.y) + ahead * half.y,
+            ahead,
+        ]
+    }
+
+    /// Multiplies points, relative to the camera, and directions.
+    fn row(&self, axis: Vec3) -> Vec4 {
+        axis.extend(-axis.dot(self.position))
+    }
+
+    /// How far along its ray a point is that the camera sees.
+    pub(crate) fn depth(&self, point: Vec4) -> f32 {
+        let way = point.truncate() - self.position;
+        if self.orthographic { way.dot(self.forward) } else { way.length() }
+    }
 }
 
 /// Unit square to unit disk, keeping areas and neighbourhoods (Shirley and Chiu 1997).
@@ -120,6 +151,30 @@ mod tests {
         let corner = rays.ray(Vec2::ZERO, Vec2::ZERO).direction;
         let expected = Vec3::new(-2.0 * 0.5_f32.tan(), 0.5_f32.tan(), -1.0).normalize();
         assert!((corner - expected).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_point_is_seen_where_its_ray_begins() {
+        let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.5, 0.0), 1.0);
+        let flat =
+            Camera { projection: Projection::Orthographic { half_height: 2.0 }, ..camera.clone() };
+        for camera in [camera, flat] {
+            let rays = CameraRays::new(&camera, 200, 100).cropped([20, 30], [90, 60]);
+            let pixel = Vec2::new(12.5, 40.0);
+            let ray = rays.ray(pixel, Vec2::ZERO);
+            let seen = |point: Vec4| {
+                let [x, y, ahead] = rays.projection().map(|row| row.dot(point));
+                (ahead > 0.0).then(|| Vec2::new(x, y) / ahead)
+            };
+            let point = (ray.origin + 3.0 * ray.direction).extend(1.0);
+            assert!(seen(point).expect("it is ahead").distance(pixel) < 1e-3);
+            assert!((rays.depth(point) - 3.0).abs() < 1e-5);
+            let far = seen((7.0 * ray.direction).extend(0.0));
+            assert_eq!(far.is_some_and(|far| far.distance(pixel) < 1e-3), !rays.orthographic);
+            if !rays.orthographic {
+                assert_eq!(seen((ray.origin - ray.direction).extend(1.0)), None);
+            }
+        }
     }
 
     #[test]

@@ -11,12 +11,14 @@ mod gi;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod gpu_facts;
+#[cfg(feature = "window")]
+pub(crate) mod keyframe;
 mod pass;
 mod progress;
-#[cfg(feature = "window")]
-mod resized;
 mod session;
 mod sharing;
+#[cfg(feature = "window")]
+mod resized;
 mod view;
 mod view_probe;
 
