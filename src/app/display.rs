@@ -10,7 +10,7 @@ use super::panels::scope::Textures;
 use super::presenter::{Order, Presenter, Shown};
 use super::screen::Screen;
 use super::threads::Wake;
-use super::worker::Snapshot;
+use super::worker::{Request, Snapshot};
 use crate::develop::DevelopSettings;
 use crate::error::Result;
 use crate::image::Rgb8;
@@ -60,7 +60,7 @@ impl Display {
     /// Has a picture made ready.
     pub(super) fn order(
         &mut self,
-        snapshot: &Arc<Snapshot>,
+        (snapshot, latest): (&Arc<Snapshot>, Option<Arc<Request>>),
         document: &Document,
         interface: &Interface,
         compared: Option<Comparison>,
@@ -69,6 +69,7 @@ impl Display {
         self.presenter.order(Order {
             developer: Arc::clone(&self.screen.developer),
             snapshot: Arc::clone(snapshot),
+            ahead: latest.filter(|latest| latest.moving && latest.view != snapshot.request.view),
             denoiser: look.denoise.then_some(look.denoiser),
             metered: look.auto_exposure.then_some(look.white_balance),
             overlay: interface.overlay,

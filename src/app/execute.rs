@@ -18,7 +18,7 @@ use super::screen::color_image;
 use super::settings_file::lasting_scene;
 use super::sync::stay_in_scene;
 use super::tasks::TaskResult;
-use super::worker::{Activity, Origin, Reference, Snapshot};
+use super::worker::{Activity, Reference, Snapshot};
 use super::{convergence, desktop, save, surface_map, theme};
 
 use crate::image::{Image, read_picture};
@@ -264,15 +264,14 @@ impl App {
         let shown = self.display.shown.as_ref()?;
         let snapshot = &shown.order.snapshot;
         let view = &snapshot.request.view;
-        // One that was resized is shown with it for a moment, and is none of it.
-        let is_resized = snapshot.backdrop.as_ref().is_some_and(|b| b.origin == Origin::Resized);
-        let of_size = shown.image.clone().filter(|_| !is_resized);
+        // What was seen from elsewhere is none of it.
+        let of_size = shown.image.clone().filter(|_| !shown.is_carried);
         let of_size =
             of_size.filter(|image| (image.width, image.height) == (view.width, view.height));
         // As long as a smaller picture says more, it is that which is shown.
         let is_small = shown.image.is_some()
             && of_size.is_none()
-            && !is_resized
+            && !shown.is_carried
             && snapshot.activity != Activity::Done;
         let is_whole = snapshot.is_lasting() && !is_small && self.is_of_document(snapshot);
         is_whole.then(|| of_size.unwrap_or_else(|| Arc::new(shown.order.image())))

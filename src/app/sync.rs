@@ -246,7 +246,8 @@ impl App {
             let is_whole = document.region.is_none() && snapshot.request.view.crop.is_none();
             let compared = Comparison::new(self.interface.compared, &self.library.history);
             let compared = compared.filter(|_| is_whole);
-            self.display.order(snapshot, document, &self.interface, compared);
+            let latest = self.rendering.worker.latest();
+            self.display.order((snapshot, latest), document, &self.interface, compared);
         }
     }
 

@@ -70,13 +70,6 @@ impl Denoiser {
     }
 }
 
-/// The film's picture with its noise and the samples of `other`, as by [`Denoiser::denoise`].
-#[cfg(feature = "window")]
-pub(crate) fn unfiltered(film: &Film, other: Option<(&Film, f32)>) -> Image {
-    let samples = Samples::of(film, other);
-    samples.restored(samples.image())
-}
-
 /// The film's picture through the filter that is always there, as by [`Denoiser::denoise`].
 pub fn quick(film: &Film, other: Option<(&Film, f32)>) -> Image {
     if !film.has_layers() {

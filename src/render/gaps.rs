@@ -29,22 +29,6 @@ impl Film {
         }
         Cow::Owned(film)
     }
-
-    /// It with its gaps filled, as by [`Self::without_gaps`], where another one of its size and layers has no samples
-    /// either.
-    #[cfg(feature = "window")]
-    pub(crate) fn without_gaps_beside(&self, other: &Self) -> Self {
-        let mut filled = self.without_gaps().into_owned();
-        for (index, of_other) in other.pixels().iter().enumerate() {
-            if of_other.samples() > 0 {
-                filled.pixels[index] = self.pixels[index];
-                if let Some(surface) = filled.surfaces.get_mut(index) {
-                    *surface = self.surfaces[index];
-                }
-            }
-        }
-        filled
-    }
 }
 
 #[cfg(test)]
@@ -72,17 +56,5 @@ mod tests {
         assert_eq!([at(0, 0), at(3, 0), at(5, 0)], [0.0, 0.0, 4.0], "as it was begun");
         assert_eq!([at(3, 1), at(3, 2), at(3, 3)], [103.0; 3], "the row between");
         assert_eq!([at(7, 4), at(8, 4)], [44.0, 48.0]);
-    }
-
-    #[cfg(feature = "window")]
-    #[test]
-    fn gaps_are_filled_where_another_film_has_no_samples_either() {
-        let mut begun = Film::new(4, 1, true);
-        begun.add(0, 0, &PathResult { radiance: Vec3::ONE, ..PathResult::default() });
-        let mut other = Film::new(4, 1, true);
-        other.add(2, 0, &PathResult::default());
-        let filled = begun.without_gaps_beside(&other);
-        let counts: Vec<u32> = filled.pixels().iter().map(|pixel| pixel.samples()).collect();
-        assert_eq!(counts, [1, 1, 0, 1]);
     }
 }

@@ -18,7 +18,7 @@ mod progress;
 mod session;
 mod sharing;
 #[cfg(feature = "window")]
-mod resized;
+mod together;
 mod view;
 mod view_probe;
 

@@ -76,7 +76,12 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     };
     match snapshot.activity {
         Activity::Moving => {
-            word(ui, "Moving", theme::SECOND, "A smaller picture while the view or light changes");
+            word(
+                ui,
+                "Moving",
+                theme::SECOND,
+                "A coarse picture while the view or light changes, over what was seen before",
+            );
         }
         Activity::Learning(share) => {
             let learning = &snapshot.now;
@@ -129,10 +134,6 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             Origin::Cache => Some((
                 "cached light",
                 "Share of cached light in the picture: free of noise at once, a few percent off, replaced as samples arrive, never saved",
-            )),
-            Origin::Resized => Some((
-                "resized",
-                "Share of the picture from before the resize: replaced as samples arrive, never saved",
             )),
             Origin::Before => None,
         };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::carried::Carried;
 use super::order::{Order, Shown};
 use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
@@ -50,6 +51,7 @@ pub(super) struct Memory {
     whole: Option<Metered>,
     surfaces: Option<(Arc<Request>, SurfaceMap)>,
     facts: Option<(Arc<LightGrid>, bool, Arc<CellFacts>)>,
+    carried: Carried,
     uploads: Uploads,
 }
 
@@ -61,6 +63,8 @@ type OverlayKey = (u64, Overlay, Option<u32>, Option<(Look, f32)>);
 struct Uploads {
     developer: Option<Arc<Developer>>,
     picture: Last<SourceKey, Prepared>,
+    /// It together with what is carried, in the view of a request that is ahead.
+    completed: Last<(SourceKey, Option<usize>), Prepared>,
     plain: Last<SourceKey, Prepared>,
     /// By the picture that is rendered, too, where that is compared.
     compared: Last<(Comparison, Option<SourceKey>), Compared>,
@@ -86,9 +90,13 @@ impl Memory {
         }
         self.leave_what_is_not_in(order);
         let source = Source::main(order);
+        self.carried.leave_others(&order.snapshot.request);
         let prepare = || Ok(source.prepare(&developer));
-        let Prepared { mut picture, image, mut failure } =
-            self.uploads.picture.or_make(source.key(), prepare)?;
+        let own = self.uploads.picture.or_make(source.key(), prepare)?;
+        let key = (source.key(), order.ahead.as_ref().map(|ahead| Arc::as_ptr(ahead) as usize));
+        let complete = || Ok(self.carried.complete(order, own));
+        let Prepared { mut picture, image, is_carried, mut failure } =
+            self.uploads.completed.or_make(key, complete)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(order) {
                 return Ok(ev);
@@ -119,7 +127,7 @@ impl Memory {
         })?;
         let (mut other, mut difference, mut uncompared) = (None, None, None);
         if let Some(comparison) = &order.compared {
-            let own = image.clone().filter(|_| !source.is_resized());
+            let own = image.clone().filter(|_| !is_carried);
             let now = || own.unwrap_or_else(|| Arc::new(source.session.film.image()));
             let of = comparison.shows_now().then(|| source.key());
             let compare = || Ok(comparison.prepare(&developer, now));
@@ -138,6 +146,9 @@ impl Memory {
             let plain = self.uploads.plain.or_make(source.key(), prepare)?;
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
+        if order.compared.is_none() && order.ahead.is_none() {
+            self.carried.keep(&order.snapshot, image.as_ref());
+        }
         developer.gpu().check()?;
         let (overlay, words) =
             painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
@@ -146,6 +157,7 @@ impl Memory {
             order: order.presented(),
             picture,
             image,
+            is_carried,
             other,
             difference,
             uncompared,

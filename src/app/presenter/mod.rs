@@ -1,6 +1,7 @@
 //! Makes ready what the screen is developed from, on its own threads: pictures on the device, their
 //! exposure, overlays. The window never waits for a filter or an overlay, and develops by itself.
 
+mod carried;
 mod memory;
 mod order;
 mod rest;
@@ -13,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use memory::Memory;
 pub(crate) use order::{Order, Shown};
-use rest::{Work, rest_after};
+use rest::{MOVING_REST, Work, rest_after};
 
 use super::threads::{Latest, LatestThread, Wake, lock};
 use crate::error::{Error, Result};
@@ -104,7 +105,11 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
             // The panic is on the terminal; the next picture is another try.
             Err(_) => memory = Memory::default(),
         }
-        let rest = rest_after(work.time(start.elapsed()), kept.snapshot.youngest_seconds());
+        let took = work.time(start.elapsed());
+        let rest = match kept.snapshot.request.moving {
+            true => took.mul_f64(MOVING_REST),
+            false => rest_after(took, kept.snapshot.youngest_seconds()),
+        };
         let end = Instant::now() + rest;
         kept.snapshot.rest.set_end(end);
         last = Some((kept, end));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::app::comparison::Comparison;
 use crate::app::document::Look;
 use crate::app::overlays::{Label, Legend, Overlay};
-use crate::app::worker::{Activity, Snapshot};
+use crate::app::worker::{Activity, Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::image::Image;
@@ -18,6 +18,8 @@ pub(crate) struct Order {
     pub(in crate::app) developer: Arc<Developer>,
     /// The film.
     pub snapshot: Arc<Snapshot>,
+    /// The view of a moving camera that is asked for by now, if that is another one.
+    pub ahead: Option<Arc<Request>>,
     /// What takes noise out, if anything shall.
     pub denoiser: Option<Denoiser>,
     /// The white balance the exposure is to be measured under, if it shall be.
@@ -36,6 +38,7 @@ impl PartialEq for Order {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.developer, &other.developer)
             && self.snapshot.number == other.snapshot.number
+            && self.ahead.as_ref().map(Arc::as_ptr) == other.ahead.as_ref().map(Arc::as_ptr)
             && self.denoiser == other.denoiser
             && self.metered == other.metered
             && self.overlay == other.overlay
@@ -90,6 +93,8 @@ pub(crate) struct Shown {
     pub(in crate::app) picture: LinearPicture,
     /// It as it was made on the host, unless it was made on the device.
     pub(in crate::app) image: Option<Arc<Image>>,
+    /// Whether light that was seen from elsewhere, or in another size, is in it.
+    pub(in crate::app) is_carried: bool,
     /// What the wipe uncovers: the plain picture or one of the history.
     pub(in crate::app) other: Option<LinearPicture>,
     /// Stops that bring the picture to middle grey; 0 unless measured.
@@ -112,8 +117,8 @@ pub(crate) struct Shown {
 mod tests {
     use super::*;
     use crate::app::presenter::source::tests::{film, session};
+    use crate::app::worker::SessionSnapshot;
     use crate::app::worker::tests::{request_of, snapshot_of};
-    use crate::app::worker::{Request, SessionSnapshot};
     use crate::develop::tests::developer;
 
     #[test]
@@ -126,6 +131,7 @@ mod tests {
                 request,
                 SessionSnapshot { samples, ..session(film(12, 1, 1)) },
             )),
+            ahead: None,
             denoiser: None,
             metered: None,
             overlay: None,

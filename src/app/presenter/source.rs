@@ -4,9 +4,8 @@ use std::sync::{Arc, Weak};
 
 use super::order::Order;
 use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
-use crate::denoise::{Denoiser, blend, unfiltered};
+use crate::denoise::{Denoiser, blend};
 use crate::develop::{Developer, LinearPicture};
-use crate::error::Result;
 use crate::image::Image;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
@@ -17,18 +16,20 @@ pub(super) struct Prepared {
     pub(super) picture: LinearPicture,
     /// The same, if it was made on the host.
     pub(super) image: Option<Arc<Image>>,
+    /// Whether something of it was seen from elsewhere, or in another size.
+    pub(super) is_carried: bool,
     /// Why its noise was not taken out as was wished.
     pub(super) failure: Option<String>,
 }
 
 impl Prepared {
-    fn of(developer: &Developer, image: Image) -> Self {
+    pub(super) fn of(developer: &Developer, image: Image) -> Self {
         let picture = developer.upload_image(&image);
-        Self { picture, image: Some(Arc::new(image)), failure: None }
+        Self { picture, image: Some(Arc::new(image)), is_carried: false, failure: None }
     }
 
     fn on_device(picture: LinearPicture) -> Self {
-        Self { picture, image: None, failure: None }
+        Self { picture, image: None, is_carried: false, failure: None }
     }
 }
 
@@ -129,11 +130,6 @@ impl Source {
             }
     }
 
-    /// Whether a picture from before its size changed counts with it.
-    pub(super) fn is_resized(&self) -> bool {
-        self.is_of(Origin::Resized)
-    }
-
     fn is_of(&self, origin: Origin) -> bool {
         self.backdrop.as_ref().is_some_and(|backdrop| backdrop.origin == origin)
     }
@@ -157,13 +153,11 @@ impl Source {
         let other = backdrop.filter(|(other, worth)| {
             film.is_alike(other) && *worth > 0.0 && (has_all || other.min_samples() > 0)
         });
-        let is_resized = other.is_some() && self.is_resized();
         let is_blended = other.is_some() && !self.is_of(Origin::Before);
         let is_surpassed =
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
         let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
-            None if is_resized && has_all => Prepared::of(developer, unfiltered(film, other)),
             None if self.is_whole => Prepared::on_device(noisy(false)),
             Some(Denoiser::ATrous)
                 if self.is_whole
@@ -175,12 +169,6 @@ impl Source {
             }
             // A picture with holes or in other pixels is there to see where one is going.
             None => blended(),
-            Some(denoiser) if !can_filter && self.is_resized() => {
-                match continued(denoiser, film, backdrop) {
-                    Ok(image) => Prepared::of(developer, image),
-                    Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
-                }
-            }
             Some(_) if !can_filter => blended(),
             Some(denoiser) => match denoiser.denoise(film, other) {
                 Ok(image) => Prepared::of(developer, image),
@@ -188,18 +176,6 @@ impl Source {
             },
         }
     }
-}
-
-/// A picture whose sides have only been begun, and whose middle is that of a resized one, of which it is filtered.
-fn continued(denoiser: Denoiser, film: &Film, resized: Option<(&Film, f32)>) -> Result<Image> {
-    let mut image = blend(film, resized);
-    if let Some((middle, _)) = resized {
-        let filtered = denoiser.denoise(&film.without_gaps_beside(middle), resized)?;
-        let both = image.pixels.iter_mut().zip(filtered.pixels).zip(middle.pixels());
-        both.filter(|(_, pixel)| pixel.samples() > 0)
-            .for_each(|((shown, filtered), _)| *shown = filtered);
-    }
-    Ok(image)
 }
 
 #[cfg(test)]
@@ -272,34 +248,6 @@ pub(super) mod tests {
         assert_eq!(prepared(cached.clone(), many.clone(), true), quick(&many, None).pixels);
         let few = film_of([6, 4], 1, 3);
         assert_eq!(prepared(whole.clone(), few.clone(), true), quick(&few, None).pixels);
-    }
-
-    #[test]
-    fn a_resized_picture_is_shown_with_what_there_is_of_the_new_one() {
-        let Some(developer) = developer() else { return };
-        let resized = film(8, 1, 9).resized([12, 8]);
-        assert_eq!(resized.min_samples(), 0, "the sides are not in it");
-        let prepared = |own: &Film, denoiser, is_whole| {
-            let (samples, film) = (resized.total_samples(), Arc::new(resized.clone()));
-            let backdrop = Some(Backdrop { film, samples, worth: 0.5, origin: Origin::Resized });
-            let session = session(own.clone());
-            let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
-            prepared.image.expect("made on the host").pixels.clone()
-        };
-        let (holes, whole, denoiser) = (film(12, 2, 1), film(12, 1, 1), Some(Denoiser::ATrous));
-        let other = Some((&resized, 0.5));
-        let (sides, middle) = (
-            blend(&holes, other).pixels,
-            quick(&holes.without_gaps_beside(&resized), other).pixels,
-        );
-        let shown = prepared(&holes, denoiser, false);
-        assert_eq!((shown[0], shown[6]), (sides[0], middle[6]));
-        assert!(sides[6] != middle[6], "it is filtered");
-        assert_eq!(prepared(&whole, denoiser, true), quick(&whole, other).pixels);
-        let shown = prepared(&whole, None, true);
-        assert_eq!(shown, unfiltered(&whole, other).pixels);
-        assert_eq!(shown[0], whole.image().pixels[0], "of the sides there is nothing else");
-        assert_ne!(shown[6], whole.image().pixels[6]);
     }
 
     #[test]

@@ -90,6 +90,11 @@ impl Worker {
         lock(&self.shared.snapshot).clone()
     }
 
+    /// What was asked for last.
+    pub(super) fn latest(&self) -> Option<Arc<Request>> {
+        self.shared.orders.slot().value.clone()
+    }
+
     /// Whether a picture is what was asked for last.
     pub(super) fn has_answered(&self, snapshot: &Snapshot) -> bool {
         let latest = &self.shared.orders.slot().value;

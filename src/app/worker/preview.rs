@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use super::earlier::EarlierFilm;
 use super::request::Request;
 use super::sessions::SLICE;
-use super::snapshot::{Activity, Backdrop, Origin, SessionSnapshot};
+use super::snapshot::{Backdrop, Origin, SessionSnapshot};
+use crate::render::Session;
 use crate::render::cached_picture::{self, CachedPicture};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
-use crate::render::{Session, View};
 
 /// A film that is shown in place is read back this seldom.
 const READING_GAP: Duration = Duration::from_millis(250);
@@ -58,19 +58,6 @@ impl Preview {
         *self = Self { earlier, ..Self::default() };
     }
 
-    /// Resizes the film from before to the size of the picture.
-    pub(super) fn resize_earlier(&mut self, view: &View) {
-        if let Some(earlier) = &mut self.earlier {
-            earlier.resize(view);
-        }
-    }
-
-    /// Whether the film from before says so much that no cached light is needed beside it.
-    pub(super) fn is_rich(&self) -> bool {
-        let enough = 2.0 / 3.0 * cached_picture::SAMPLES as f32;
-        self.earlier.as_ref().is_some_and(|earlier| earlier.is_resized_worth(enough))
-    }
-
     /// Goes on with the very picture that was left: what was kept of it to be seen meanwhile has the same samples.
     pub(super) fn resume(&mut self, request: &Request) {
         self.earlier.take_if(|earlier| earlier.is_of_same(request));
@@ -90,11 +77,9 @@ impl Preview {
         }
     }
 
-    /// Prepares for publishing a picture of so many samples: the earlier film goes once it counts no more, and it is
-    /// decided whether new copies are wanted, which are not where `is_throttled`. A picture that `is_final` is always
-    /// copied.
-    pub(super) fn prepare(&mut self, samples: u32, is_final: bool, is_throttled: bool) {
-        self.earlier.take_if(|earlier| earlier.has_faded(samples));
+    /// Decides before a picture is published whether new copies are wanted, which are not where `is_throttled`. A
+    /// picture that `is_final` is always copied.
+    pub(super) fn prepare(&mut self, is_final: bool, is_throttled: bool) {
         self.rests = !is_final && (is_throttled || self.is_ahead());
     }
 
@@ -207,13 +192,12 @@ impl Preview {
     pub(super) fn backdrop(
         &mut self,
         request: &Arc<Request>,
-        activity: Activity,
         samples: u32,
         cached: &CachedPicture<Session<'_>>,
     ) -> Option<Backdrop> {
         // A film that was kept of this request has the same samples.
         let earlier = self.earlier.as_ref().filter(|earlier| !earlier.is_of(request));
-        let earlier = earlier.and_then(|earlier| earlier.backdrop(&request.view, samples));
+        let earlier = earlier.and_then(|earlier| earlier.backdrop(&request.view));
         let seen = earlier.as_ref().map_or(0, |earlier| earlier.samples);
         let cached = self.cached_film(cached, 3 * seen / 2).filter(|_| request.wants_cached);
         let shown = match cached {
@@ -223,12 +207,7 @@ impl Preview {
             }
             None => earlier,
         };
-        // What is compared, and what is done, is what will be saved.
-        let is_plain = request.split || activity == Activity::Done;
-        let is_wanted = |backdrop: &Backdrop| {
-            backdrop.worth > 0.0 && !(is_plain && backdrop.origin == Origin::Resized)
-        };
-        shown.filter(is_wanted)
+        shown.filter(|backdrop| backdrop.worth > 0.0)
     }
 
     /// The cached picture's film and how many samples that has, if these are more than `least` and all over the

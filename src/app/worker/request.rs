@@ -95,6 +95,15 @@ impl Request {
             && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
     }
 
+    /// Whether surfaces look for `self` as they do for `new`, from wherever they are seen.
+    pub(in crate::app) fn is_seen_like(&self, new: &Self) -> bool {
+        let (a, b) = (&self.view, &new.view);
+        Arc::ptr_eq(&self.world, &new.world)
+            && Arc::ptr_eq(&self.environment, &new.environment)
+            && (a.crop, b.crop) == (None, None)
+            && (a.medium, a.background, a.limits) == (b.medium, b.background, b.limits)
+    }
+
     pub(super) fn is_same(&self, new: &Self) -> bool {
         !self.restarts(new)
             && self.split == new.split

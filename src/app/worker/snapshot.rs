@@ -165,8 +165,6 @@ pub(crate) enum Origin {
     Cache,
     /// A picture of the same view that was rendered before, as it is: it may be a small one.
     Before,
-    /// One of another size, resized to that of the picture, of which it may show less.
-    Resized,
 }
 
 impl Backdrop {
@@ -215,9 +213,6 @@ impl Snapshot {
     /// Whether there is anything to be seen.
     pub(crate) fn has_picture(&self) -> bool {
         let is_paused = self.activity == Activity::Paused && self.main.figures.samples > 0;
-        // What is resized may lack the sides.
-        let is_backed =
-            |backdrop: &Backdrop| backdrop.origin != Origin::Resized || backdrop.film.is_begun();
-        self.backdrop.as_ref().is_some_and(is_backed) || is_paused || self.main.is_begun()
+        self.backdrop.is_some() || is_paused || self.main.is_begun()
     }
 }

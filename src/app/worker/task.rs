@@ -140,11 +140,10 @@ impl<'a> PictureTask<'a> {
     /// The full picture: learning first, then samples until a rule is met.
     fn render(&mut self) {
         let mut pictures = self.begin_pictures();
-        let is_rich = self.preview.is_rich();
         // When the picture went on last.
         let mut went_on = Instant::now();
         while let Some(activity) = self.next_activity(&pictures) {
-            self.begin_and_end_others(&mut pictures, is_rich);
+            self.begin_and_end_others(&mut pictures);
             match activity {
                 Activity::Paused | Activity::Done => {
                     self.stand_still(activity, &mut pictures);
@@ -191,9 +190,6 @@ impl<'a> PictureTask<'a> {
             self.publish(Activity::Rendering, &pictures);
             return pictures;
         }
-        if request.previews && !self.sessions.device.is_quick(&request) {
-            self.preview.resize_earlier(&request.view);
-        }
         let view = request.view.clone();
         let main = if request.is_frozen && self.sessions.kept.distributions_for(&request).is_some()
         {
@@ -207,7 +203,7 @@ impl<'a> PictureTask<'a> {
     }
 
     /// Begins the cached and the plain picture where they are wanted, and ends them where they are not.
-    fn begin_and_end_others(&mut self, pictures: &mut Pictures<'a>, is_rich: bool) {
+    fn begin_and_end_others(&mut self, pictures: &mut Pictures<'a>) {
         let Pictures { main, plain, cached, .. } = pictures;
         let request = Arc::clone(self.request());
         let may_want_cached = self.may_want_cached(main);
@@ -217,10 +213,7 @@ impl<'a> PictureTask<'a> {
             if !(is_complete && may_want_cached) {
                 cached.end(|session| self.sessions.keep_training(session));
             }
-        } else if matches!(cached, CachedPicture::Absent)
-            && !is_rich
-            && self.is_time_for_cached(main)
-        {
+        } else if matches!(cached, CachedPicture::Absent) && self.is_time_for_cached(main) {
             let view = View { gi: Gi::Cached, ..request.view.clone() };
             let session = self.sessions.experienced_session(view);
             *cached = CachedPicture::UnderWay(Box::new(session));
@@ -439,7 +432,7 @@ impl<'a> PictureTask<'a> {
         let (shared, request) = (self.sessions.watch.shared, Arc::clone(self.request()));
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
         let Pictures { main, plain, cached, .. } = pictures;
-        self.preview.prepare(main.samples(), is_final, shared.throttle.lasts(MAX_GAP));
+        self.preview.prepare(is_final, shared.throttle.lasts(MAX_GAP));
         let (main_snapshot, mut reading) = self.session_snapshot(MAIN, main, is_final);
         let plain = plain.as_ref().map(|plain| {
             let (snapshot, cost) = self.session_snapshot(PLAIN, plain, is_final);
@@ -457,7 +450,7 @@ impl<'a> PictureTask<'a> {
             now: main.figures(),
             plain,
             counters: self.counters.clone(),
-            backdrop: self.preview.backdrop(&request, activity, main.samples(), cached),
+            backdrop: self.preview.backdrop(&request, main.samples(), cached),
             cached_seconds: self.cached_seconds,
             cut_off,
             cache: self.inspection.cache_facts(

@@ -178,26 +178,6 @@ fn what_a_picture_begins_with_is_shown_when_it_is_everywhere() {
 }
 
 #[test]
-fn a_picture_in_another_size_goes_on_with_what_there_is_of_it() {
-    let Some(worker) = worker() else { return };
-    let request = Request { wants_cached: true, ..request_of("office", [48, 36]) };
-    worker.submit(request.clone());
-    let pixels = 48 * 36;
-    wait_for(&worker, |now| now.is_whole() && now.now.samples > 2 * 64 * pixels);
-    let view = View { width: 72, ..request.view.clone() };
-    worker.submit(Request { view, ..request.clone() });
-    let is_wide = |now: &Snapshot| now.request.view.width == 72;
-    let first = wait_for(&worker, |now| is_wide(now) && now.has_picture());
-    assert!(first.main.is_begun(), "its sides are not in what there is");
-    let backdrop = first.backdrop.as_ref().expect("it goes on with it");
-    assert_eq!((backdrop.origin, backdrop.film.width), (Origin::Resized, 72));
-    assert!(backdrop.share(1) > 0.9);
-    // It fades out.
-    let last = wait_for(&worker, |now| is_wide(now) && now.main.samples > 256);
-    assert!(last.backdrop.is_none());
-}
-
-#[test]
 fn the_cpu_goes_on_until_a_gpu_is_ready() {
     let Some(worker) = worker() else { return };
     let request = Request { device: DeviceChoice::Gpu, ..request_of("office", [96, 72]) };

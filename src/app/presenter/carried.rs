@@ -1,0 +1,263 @@
+//! The last whole picture, carried to where the camera goes: it is shown until that view is rendered.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::order::Order;
+use super::source::Prepared;
+use crate::app::worker::{Activity, Request, Snapshot};
+use crate::color::luminance;
+use crate::image::Image;
+use crate::render::View;
+use crate::render::keyframe::Keyframe;
+
+/// Most pixels that are carried for each picture of a movement.
+const MAX_PIXELS: u64 = 1 << 20;
+/// What is carried counts as so many samples a pixel; in a view through the same camera, as those it has, but no more
+/// than this. Once the picture has four times as many, it counts nothing.
+const WORTH: f64 = 4.0;
+const MAX_WORTH: f64 = 64.0;
+/// Pixels along an edge of the blocks whose light is compared.
+const BLOCK: usize = 16;
+/// By what share of their light blocks may differ before what is carried counts less, and where it counts nothing.
+const DIFFERENCES: [f32; 2] = [0.06, 0.2];
+
+/// The last whole picture.
+#[derive(Default)]
+pub(super) struct Carried(Option<Last>);
+
+struct Last {
+    /// What it was rendered for.
+    request: Arc<Request>,
+    keyframe: Keyframe,
+    /// A pixel, in the mean.
+    samples: f64,
+}
+
+impl Carried {
+    /// Keeps what is seen, if it is a whole picture at rest.
+    pub(super) fn keep(&mut self, snapshot: &Snapshot, image: Option<&Arc<Image>>) {
+        let (request, film) = (&snapshot.request, &snapshot.main.film);
+        let is_kept = snapshot.is_lasting()
+            && request.previews
+            && request.view.crop.is_none()
+            && film.min_samples() > 0;
+        if !is_kept {
+            return;
+        }
+        let image = image.cloned().unwrap_or_else(|| Arc::new(film.image()));
+        let keyframe = Keyframe::new(&request.world, &request.view, film, image);
+        let samples = film.total_samples() as f64 / film.pixels().len() as f64;
+        let last = |keyframe| Last { request: Arc::clone(request), keyframe, samples };
+        self.0 = keyframe.map(last);
+    }
+
+    /// Lets go of a picture of another scene, under another light, or without a use.
+    pub(super) fn leave_others(&mut self, request: &Request) {
+        self.0.take_if(|last| !last.request.is_seen_like(request));
+    }
+
+    /// A picture with what was seen before from elsewhere. A small one of a movement shows only what was not seen, in the
+    /// view of `ahead` if that is newer; one at rest takes the place of what was seen as it gets samples.
+    pub(super) fn complete(&self, order: &Order, own: Prepared) -> Prepared {
+        let (snapshot, film) = (&order.snapshot, &order.snapshot.main.film);
+        let (Some(last), Some(image)) = (&self.0, &own.image) else { return own };
+        let (of, keyframe) = (&last.request, &last.keyframe);
+        let request = order.ahead.as_ref().unwrap_or(&snapshot.request);
+        if !request.previews || !of.is_seen_like(request) {
+            return own;
+        }
+        let is_complete = (image.width, image.height) == (request.view.width, request.view.height);
+        let completed = if request.moving || !is_complete {
+            let view = carried_view(&request.view);
+            let met = Some(&**film).filter(|_| order.ahead.is_none());
+            under(&keyframe.seen_in(&view, met), image, [view.width, view.height])
+        } else {
+            let samples = film.total_samples() as f64 / image.pixels.len() as f64;
+            let is_compared = order.compared.is_some() || snapshot.plain.is_some();
+            let is_raw = order.denoiser.is_none() && snapshot.is_whole();
+            let is_resized = of.view.camera == request.view.camera;
+            let worth = if is_resized { last.samples.min(MAX_WORTH) } else { WORTH };
+            let share = 1.0 - samples / (4.0 * worth);
+            let is_over = share <= 0.0 || snapshot.activity == Activity::Done;
+            if is_over || is_raw || is_compared || of.view == request.view {
+                return own;
+            }
+            let seen = keyframe.seen_in(&request.view, Some(film));
+            faded(&seen, image, (samples / (worth * share)) as f32)
+        };
+        Prepared {
+            is_carried: true,
+            failure: own.failure,
+            ..Prepared::of(&order.developer, completed)
+        }
+    }
+}
+
+/// A movement's view in the size in which pictures are carried.
+fn carried_view(view: &View) -> View {
+    let shrink = (view.pixels() as f64 / MAX_PIXELS as f64).sqrt().ceil().max(1.0) as u32;
+    view.of_size(view.width / shrink, view.height / shrink)
+}
+
+/// What is seen, and a smaller picture of the same view where there is nothing.
+fn under(seen: &[Option<[f32; 3]>], small: &Image, [width, height]: [u32; 2]) -> Image {
+    let scale = [small.width as f32 / width as f32, small.height as f32 / height as f32];
+    let color = |(at, seen): (usize, &Option<[f32; 3]>)| {
+        seen.unwrap_or_else(|| {
+            let place = [at % width as usize, at / width as usize];
+            small.between([0, 1].map(|i| (place[i] as f32 + 0.5) * scale[i] - 0.5))
+        })
+    };
+    let pixels = seen.par_iter().enumerate().map(color).collect();
+    Image { width, height, pixels }
+}
+
+/// A picture together with what is seen, where both agree; then the picture counts so many times as much.
+fn faded(seen: &[Option<[f32; 3]>], own: &Image, times: f32) -> Image {
+    let agreement = agreement(seen, own);
+    let color = |((at, seen), own_): ((usize, &Option<[f32; 3]>), &[f32; 3])| {
+        let Some(seen) = seen else { return *own_ };
+        let place = [at % own.width as usize, at / own.width as usize];
+        let in_blocks = place.map(|place| (place as f32 + 0.5) / BLOCK as f32 - 0.5);
+        let worth = agreement.between(in_blocks)[0];
+        let share = if worth > 0.0 { worth / (worth + times) } else { 0.0 };
+        std::array::from_fn(|i| own_[i] + share * (seen[i] - own_[i]))
+    };
+    let pixels = seen.par_iter().enumerate().zip(&own.pixels).map(color).collect();
+    Image { width: own.width, height: own.height, pixels }
+}
+
+/// How far blocks of a picture agree with what is seen there, 0 to 1 in all channels.
+fn agreement(seen: &[Option<[f32; 3]>], own: &Image) -> Image {
+    let (width, height) = (own.width as usize, own.height as usize);
+    let count = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
+    let of_block = |block: usize| {
+        let [left, top] = [block % count[0] * BLOCK, block / count[0] * BLOCK];
+        let (mut lights, mut apart) = (0.0_f32, 0.0_f32);
+        for y in top..(top + BLOCK).min(height) {
+            for at in y * width + left..y * width + (left + BLOCK).min(width) {
+                if let Some(seen) = seen[at] {
+                    let [seen, own] = [seen, own.pixels[at]].map(|color| luminance(color.into()));
+                    lights += own.max(seen);
+                    apart += own - seen;
+                }
+            }
+        }
+        // Where nothing is seen, blocks beside this one count less.
+        let difference = if lights > 0.0 { apart.abs() / lights } else { 1.0 };
+        let [least, most] = DIFFERENCES;
+        [1.0 - ((difference - least) / (most - least)).clamp(0.0, 1.0); 3]
+    };
+    let pixels = (0..count[0] * count[1]).into_par_iter().map(of_block).collect();
+    Image { width: count[0] as u32, height: count[1] as u32, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::app::presenter::source::tests::session;
+    use crate::app::worker::tests::{request_of, snapshot_of};
+    use crate::denoise::Denoiser;
+    use crate::develop::tests::developer;
+    use crate::render::Session;
+    use crate::render::film::Film;
+
+    fn rendered(request: &Request, size: [u32; 2], samples: u32) -> Film {
+        let view = View { layers: true, ..request.view.of_size(size[0], size[1]) };
+        let mut session = Session::new(&request.world, &request.environment, view);
+        session.finish_learning();
+        session.advance(samples, &AtomicBool::new(false)).expect("rendered");
+        session.film().clone()
+    }
+
+    #[test]
+    fn a_moving_camera_takes_the_last_picture_along() {
+        let Some(developer) = developer().map(Arc::new) else { return };
+        let still = request_of("office", [48, 36]);
+        let film = rendered(&still, [48, 36], 4);
+        let snapshot = |request: &Request, film: &Film| {
+            snapshot_of(&Arc::new(request.clone()), session(film.clone()))
+        };
+        let mut carried = Carried::default();
+        let own = |film: &Film| {
+            let grey = Image { pixels: vec![[0.5; 3]; film.pixels().len()], ..film.image() };
+            Prepared::of(&developer, grey)
+        };
+        let image_of = |prepared: Prepared| prepared.image.expect("made on the host");
+        let order = |request: &Request, film: &Film| Order {
+            developer: Arc::clone(&developer),
+            snapshot: Arc::new(snapshot(request, film)),
+            ahead: None,
+            denoiser: Some(Denoiser::ATrous),
+            metered: None,
+            overlay: None,
+            look: None,
+            tile: None,
+            compared: None,
+        };
+        let complete = |carried: &Carried, request: &Request, film: &Film| {
+            image_of(carried.complete(&order(request, film), own(film)))
+        };
+
+        let mut moving = Request { moving: true, ..still.clone() };
+        let small = rendered(&moving, [12, 9], 1);
+        let alone = complete(&carried, &moving, &small);
+        assert_eq!((alone.width, alone.pixels[0]), (12, [0.5; 3]), "nothing is known yet");
+        carried.keep(&snapshot(&moving, &small), None);
+        assert!(carried.0.is_none(), "a small picture is not kept");
+        carried.keep(&snapshot(&still, &film), None);
+
+        // A step to the side.
+        moving.view.camera.world_from_camera.translation.x += 0.05;
+        let small = rendered(&moving, [12, 9], 1);
+        let along = complete(&carried, &moving, &small);
+        let share = |image: &Image| {
+            let own = image.pixels.iter().filter(|pixel| **pixel == [0.5; 3]).count();
+            own as f64 / image.pixels.len() as f64
+        };
+        assert_eq!((along.width, along.height), (48, 36));
+        assert!(share(&along) < 0.2, "{}", share(&along));
+
+        // The window has moved on: what was seen is where it will be.
+        let mut later = moving.clone();
+        later.view.camera.world_from_camera.translation.x += 0.05;
+        let ahead = Some(Arc::new(later.clone()));
+        let onward = carried.complete(&Order { ahead, ..order(&moving, &small) }, own(&small));
+        let there = carried.complete(&order(&later, &rendered(&later, [12, 9], 1)), own(&small));
+        let apart = |a: &Image, b: &Image| {
+            a.pixels.iter().zip(&b.pixels).filter(|(a, b)| a != b).count() as f64 / 1728.0
+        };
+        let (onward, there) = (image_of(onward), image_of(there));
+        let (same, other) = (apart(&onward, &there), apart(&onward, &along));
+        assert!(same < 0.1 && other > 0.5, "{same}, {other}");
+
+        // At rest the new picture takes its place, where it differs at once.
+        let rest = Request { moving: false, ..moving.clone() };
+        let of_truth = |film: &Film| {
+            let prepared = Prepared::of(&developer, film.image());
+            image_of(carried.complete(&order(&rest, film), prepared))
+        };
+        let (few, many) = (rendered(&rest, [48, 36], 1), rendered(&rest, [48, 36], 16));
+        assert_ne!(*of_truth(&few), few.image());
+        assert_eq!(*of_truth(&many), many.image());
+        assert!(share(&complete(&carried, &rest, &few)) > 0.8, "it agrees nowhere");
+        assert!(!carried.complete(&order(&rest, &many), own(&many)).is_carried, "it may be kept");
+        // A window of another size.
+        let mut wide = still.clone();
+        (wide.view.width, wide.view.height) = (64, 36);
+        let begun = complete(&carried, &wide, &small);
+        assert_eq!((begun.width, begun.pixels[0]), (64, [0.5; 3]), "the sides are not known");
+        let middle = begun.at(32, 18);
+        let before = film.image().at(24, 18);
+        let apart = middle.iter().zip(before).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(apart < 0.05, "{middle:?}, {before:?}");
+
+        let other = Request { environment: request_of("open", [4, 4]).environment, ..still };
+        carried.leave_others(&other);
+        assert!(carried.0.is_none(), "the light is another");
+    }
+}
