@@ -129,7 +129,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 35] = [
     ("alarm", 49),
-    ("app", 11140),
+    ("app", 11160),
     ("bench", 594),
     ("bsdf", 1417),
     ("bvh", 1358),

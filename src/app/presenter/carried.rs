@@ -10,6 +10,7 @@ use crate::app::worker::{Activity, Request, Snapshot};
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::View;
+use crate::render::film::Film;
 use crate::render::keyframe::Keyframe;
 
 /// Most pixels that are carried for each picture of a movement.
@@ -23,16 +24,35 @@ const BLOCK: usize = 16;
 /// By what share of their light blocks may differ before what is carried counts less, and where it counts nothing.
 const DIFFERENCES: [f32; 2] = [0.06, 0.2];
 
-/// The last whole picture.
+/// The last whole picture, and that of the view before, which it takes the place of.
 #[derive(Default)]
-pub(super) struct Carried(Option<Last>);
+pub(super) struct Carried {
+    last: Option<Whole>,
+    before: Option<Whole>,
+}
 
-struct Last {
+/// A whole picture.
+struct Whole {
     /// What it was rendered for.
     request: Arc<Request>,
     keyframe: Keyframe,
     /// A pixel, in the mean.
     samples: f64,
+}
+
+impl Whole {
+    fn new(snapshot: &Snapshot, image: Arc<Image>) -> Option<Self> {
+        let (request, film) = (&snapshot.request, &snapshot.main.film);
+        let keyframe = Keyframe::new(&request.world, &request.view, film, image)?;
+        Some(Self { request: Arc::clone(request), keyframe, samples: mean_samples(film) })
+    }
+
+    /// How many samples a pixel it counts as in another view that has so many.
+    fn worth(&self, view: &View, samples: f64) -> f64 {
+        let is_resized = self.request.view.camera == view.camera;
+        let worth = if is_resized { self.samples.min(MAX_WORTH) } else { WORTH };
+        (worth - samples / 4.0).max(0.0)
+    }
 }
 
 impl Carried {
@@ -47,45 +67,50 @@ impl Carried {
             return;
         }
         let image = image.cloned().unwrap_or_else(|| Arc::new(film.image()));
-        let keyframe = Keyframe::new(&request.world, &request.view, film, image);
-        let samples = film.total_samples() as f64 / film.pixels().len() as f64;
-        let last = |keyframe| Last { request: Arc::clone(request), keyframe, samples };
-        self.0 = keyframe.map(last);
+        if self.last.as_ref().is_some_and(|last| last.request.view != request.view) {
+            self.before = self.last.take();
+        }
+        let samples = mean_samples(film);
+        self.before.take_if(|before| before.worth(&request.view, samples) == 0.0);
+        self.last = Whole::new(snapshot, image);
     }
 
-    /// Lets go of a picture of another scene, under another light, or without a use.
+    /// Lets go of pictures of another scene, or under another light.
     pub(super) fn leave_others(&mut self, request: &Request) {
-        self.0.take_if(|last| !last.request.is_seen_like(request));
+        for whole in [&mut self.last, &mut self.before] {
+            whole.take_if(|whole| !whole.request.is_seen_like(request));
+        }
     }
 
     /// A picture with what was seen before from elsewhere. A small one of a movement shows only what was not seen, in the
     /// view of `ahead` if that is newer; one at rest takes the place of what was seen as it gets samples.
     pub(super) fn complete(&self, order: &Order, own: Prepared) -> Prepared {
         let (snapshot, film) = (&order.snapshot, &order.snapshot.main.film);
-        let (Some(last), Some(image)) = (&self.0, &own.image) else { return own };
-        let (of, keyframe) = (&last.request, &last.keyframe);
         let request = order.ahead.as_ref().unwrap_or(&snapshot.request);
-        if !request.previews || !of.is_seen_like(request) {
+        let view = &request.view;
+        let is_of_view = |last: &&Whole| last.request.view == *view;
+        let shown = self.last.as_ref().filter(|last| request.moving || !is_of_view(last));
+        let shown = shown.or(self.before.as_ref());
+        let (Some(whole), Some(image)) = (shown, &own.image) else { return own };
+        if !request.previews || !whole.request.is_seen_like(request) {
             return own;
         }
-        let is_complete = (image.width, image.height) == (request.view.width, request.view.height);
+        let is_complete = (image.width, image.height) == (view.width, view.height);
         let completed = if request.moving || !is_complete {
-            let view = carried_view(&request.view);
+            let view = carried_view(view);
             let met = Some(&**film).filter(|_| order.ahead.is_none());
-            under(&keyframe.seen_in(&view, met), image, [view.width, view.height])
+            under(&whole.keyframe.seen_in(&view, met), image, [view.width, view.height])
         } else {
-            let samples = film.total_samples() as f64 / image.pixels.len() as f64;
+            let samples = mean_samples(film);
+            let worth = whole.worth(view, samples);
             let is_compared = order.compared.is_some() || snapshot.plain.is_some();
             let is_raw = order.denoiser.is_none() && snapshot.is_whole();
-            let is_resized = of.view.camera == request.view.camera;
-            let worth = if is_resized { last.samples.min(MAX_WORTH) } else { WORTH };
-            let share = 1.0 - samples / (4.0 * worth);
-            let is_over = share <= 0.0 || snapshot.activity == Activity::Done;
-            if is_over || is_raw || is_compared || of.view == request.view {
+            let is_over = worth == 0.0 || snapshot.activity == Activity::Done;
+            if is_over || is_raw || is_compared || is_of_view(&whole) {
                 return own;
             }
-            let seen = keyframe.seen_in(&request.view, Some(film));
-            faded(&seen, image, (samples / (worth * share)) as f32)
+            let seen = whole.keyframe.seen_in(view, Some(film));
+            faded(&seen, image, (samples / worth) as f32)
         };
         Prepared {
             is_carried: true,
@@ -93,6 +118,11 @@ impl Carried {
             ..Prepared::of(&order.developer, completed)
         }
     }
+}
+
+/// Samples a pixel.
+fn mean_samples(film: &Film) -> f64 {
+    film.total_samples() as f64 / film.pixels().len().max(1) as f64
 }
 
 /// A movement's view in the size in which pictures are carried.
@@ -164,7 +194,6 @@ mod tests {
     use crate::denoise::Denoiser;
     use crate::develop::tests::developer;
     use crate::render::Session;
-    use crate::render::film::Film;
 
     fn rendered(request: &Request, size: [u32; 2], samples: u32) -> Film {
         let view = View { layers: true, ..request.view.of_size(size[0], size[1]) };
@@ -208,7 +237,7 @@ mod tests {
         let alone = complete(&carried, &moving, &small);
         assert_eq!((alone.width, alone.pixels[0]), (12, [0.5; 3]), "nothing is known yet");
         carried.keep(&snapshot(&moving, &small), None);
-        assert!(carried.0.is_none(), "a small picture is not kept");
+        assert!(carried.last.is_none(), "a small picture is not kept");
         carried.keep(&snapshot(&still, &film), None);
 
         // A step to the side.
@@ -237,16 +266,23 @@ mod tests {
 
         // At rest the new picture takes its place, where it differs at once.
         let rest = Request { moving: false, ..moving.clone() };
-        let of_truth = |film: &Film| {
+        let of_truth = |carried: &Carried, film: &Film| {
             let prepared = Prepared::of(&developer, film.image());
             image_of(carried.complete(&order(&rest, film), prepared))
         };
         let (few, many) = (rendered(&rest, [48, 36], 1), rendered(&rest, [48, 36], 16));
-        assert_ne!(*of_truth(&few), few.image());
-        assert_eq!(*of_truth(&many), many.image());
+        assert_ne!(*of_truth(&carried, &few), few.image());
+        assert_eq!(*of_truth(&carried, &many), many.image());
         assert!(share(&complete(&carried, &rest, &few)) > 0.8, "it agrees nowhere");
         assert!(!carried.complete(&order(&rest, &many), own(&many)).is_carried, "it may be kept");
+        // It fades out, though the new picture is kept by now.
+        carried.keep(&snapshot(&rest, &few), None);
+        assert_ne!(*of_truth(&carried, &few), few.image());
+        carried.keep(&snapshot(&rest, &many), None);
+        assert_eq!(*of_truth(&carried, &few), few.image());
         // A window of another size.
+        let mut carried = Carried::default();
+        carried.keep(&snapshot(&still, &film), None);
         let mut wide = still.clone();
         (wide.view.width, wide.view.height) = (64, 36);
         let begun = complete(&carried, &wide, &small);
@@ -258,6 +294,6 @@ mod tests {
 
         let other = Request { environment: request_of("open", [4, 4]).environment, ..still };
         carried.leave_others(&other);
-        assert!(carried.0.is_none(), "the light is another");
+        assert!(carried.last.is_none() && carried.before.is_none(), "the light is another");
     }
 }
