@@ -24,8 +24,7 @@ var<workgroup> batch: array<Second, TILES_OF_GROUP * BATCH>;
 // What of a second vertex's radiance reaches a lane's pixel, and the density with which it would have
 // found that vertex.
 var<workgroup> connections: array<vec4f, 64u * BATCH>;
-// Sums of densities of some pixels of a tile that follow each other, for each second vertex of the batch.
-const SUMMED = BATCH;
+// Sums of BATCH densities that follow each other in `connections`: of pixels of one tile, for one second vertex.
 var<workgroup> partial_densities: array<f32, 64u>;
 
 // What connects a lane's first vertex with second vertex `index` of the batch.
@@ -98,6 +97,11 @@ fn horizon_of_second(index: u32) -> f32 {
 //#end
 }
 
+// Whether light from a direction, `wi` in the shading frame, is on one side of both normals of second vertex `index`.
+fn is_on_one_side(index: u32, direction: vec3f, wi: vec3f, horizon: f32) -> bool {
+    return (wi.z > 0.0) == (dot(batch[index].geometric_normal, direction) > horizon);
+}
+
 //#if !SHEEN
 // What the body of second vertex `index` of the batch scatters of the light that is kept at `at`, but for the share
 // that leaves it towards a viewer.
@@ -111,8 +115,7 @@ fn diffuse_light_of(index: u32, at: u32) -> vec3f {
     for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
         let arriving = seconds[at + 2u * i + 2u];
         let wi = local_from_world(batch[index].shading_frame, float3(arriving));
-        let is_in_front = dot(batch[index].geometric_normal, float3(arriving)) > horizon;
-        if (wi.z > 0.0) == is_in_front && diffuse_is_seen(body, wi) {
+        if is_on_one_side(index, float3(arriving), wi, horizon) && diffuse_is_seen(body, wi) {
             let scattered_ = diffuse_eval_pdf(body, bitcast<f32>(arriving.w), wi).value;
             light += scattered_ * float3(seconds[at + 2u * i + 3u]);
         }
@@ -152,7 +155,7 @@ fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
         if any(light != vec3f(0.0)) {
             let from_ = float3(seconds[at + 2u * i + 2u]);
             let wi = local_from_world(frame, from_);
-            if (wi.z > 0.0) == (dot(batch[index].geometric_normal, from_) > horizon) {
+            if is_on_one_side(index, from_, wi, horizon) {
                 radiance += bsdf_eval_pdf_with(bsdf, wo, wi, out).value * light;
             }
         }
@@ -238,8 +241,8 @@ fn connect_seconds(
         }
         workgroupBarrier();
         var summed = 0.0;
-        for (var m = 0u; m < SUMMED; m++) {
-            summed += connections[SUMMED * lane + m].w;
+        for (var m = 0u; m < BATCH; m++) {
+            summed += connections[BATCH * lane + m].w;
         }
         partial_densities[lane] = summed;
         workgroupBarrier();
@@ -249,9 +252,9 @@ fn connect_seconds(
                 continue;
             }
             var density = 0.0;
-            for (var m = 0u; m < MEMBERS / SUMMED; m++) {
+            for (var m = 0u; m < MEMBERS / BATCH; m++) {
                 let of_tile = 64u * i + tile_in_group * MEMBERS;
-                density += partial_densities[of_tile / SUMMED + m];
+                density += partial_densities[of_tile / BATCH + m];
             }
             let index = tile_in_group * BATCH + i;
             let second_at_ = second_at(group.x, lane, first_of_batch + i);

@@ -17,7 +17,7 @@ struct Work {
     stride: u32,
     // The sample that pixels which share take; then `first` and `count` are workgroups.
     sample: u32,
-    // Of such workgroups, so many do their work in one.
+    // Groups whose paths one workgroup of `find_seconds` and of `light_seconds` follows.
     rounds: u32,
 }
 

@@ -88,7 +88,7 @@ impl Keyframe {
         let nearest: Vec<u64> = nearest.into_iter().map(AtomicU64::into_inner).collect();
         let far = met.map(|film| (farthest(self.frame, film), film));
         let seen = |at: usize| {
-            let key = source_of(&nearest, [width, height], at)?;
+            let key = source_of(&nearest, width, at)?;
             let middle = middle_of(at, width);
             if let Some((far, film)) = &far {
                 let size = Vec2::new(film.width as f32, film.height as f32);
@@ -106,21 +106,28 @@ impl Keyframe {
     }
 }
 
-/// The middle of a pixel of a picture so wide.
+/// The middle of a pixel, given the picture's width.
 fn middle_of(index: usize, width: usize) -> Vec2 {
     Vec2::new((index % width) as f32, (index / width) as f32) + 0.5
 }
 
+/// The values of a pixel and of those up to `reach` columns and rows away, given the picture's width.
+fn around<T: Copy>(
+    values: &[T],
+    width: usize,
+    at: usize,
+    reach: usize,
+) -> impl Iterator<Item = T> + '_ {
+    let (x, y) = (at % width, at / width);
+    let rows = y.saturating_sub(reach)..(y + reach + 1).min(values.len() / width);
+    let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
+    rows.flat_map(move |row| values[row * width..][columns.clone()].iter().copied())
+}
+
 /// How far away the surfaces of each pixel of a film are, or of those beside it; infinite where nothing was met.
 fn farthest(frame: Frame, film: &Film) -> Vec<f32> {
-    let (width, height) = (film.width as usize, film.height as usize);
-    let depths = depths_of(frame, film);
-    let of_pixel = |at: usize| {
-        let (x, y) = (at % width, at / width);
-        let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let rows = y.saturating_sub(1)..(y + 2).min(height);
-        rows.flat_map(|row| &depths[row * width..][columns.clone()]).copied().fold(0.0, f32::max)
-    };
+    let (depths, width) = (depths_of(frame, film), film.width as usize);
+    let of_pixel = |at| around(&depths, width, at, 1).fold(0.0, f32::max);
     (0..depths.len()).into_par_iter().map(of_pixel).collect()
 }
 
@@ -143,13 +150,8 @@ fn index_of(key: u64) -> usize {
 }
 
 /// Which point a pixel shows: its own, unless that lies in a gap between nearer ones, or one near by.
-fn source_of(nearest: &[u64], [width, height]: [usize; 2], at: usize) -> Option<u64> {
-    let (x, y) = (at % width, at / width);
-    let around = |reach: usize| {
-        let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
-        let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
-        rows.flat_map(move |row| nearest[row * width..][columns.clone()].iter().copied())
-    };
+fn source_of(nearest: &[u64], width: usize, at: usize) -> Option<u64> {
+    let around = |reach| around(nearest, width, at, reach);
     let own = nearest[at];
     if own == NOTHING {
         // Those beside it first.
@@ -168,13 +170,8 @@ fn source_of(nearest: &[u64], [width, height]: [usize; 2], at: usize) -> Option<
 /// Depths without those just behind an edge, which are NaN: the colours there have something of what is in front, and
 /// would stay behind as its outline. A mean of both sides becomes the depth of what is in front.
 fn without_outlines(depths: &[f32], width: usize) -> Vec<f32> {
-    let height = depths.len() / width.max(1);
     let depth = |at: usize| {
-        let (x, y) = (at % width, at / width);
-        let rows = y.saturating_sub(OUTLINE)..(y + OUTLINE + 1).min(height);
-        let columns = x.saturating_sub(OUTLINE)..(x + OUTLINE + 1).min(width);
-        let around = rows.flat_map(|row| &depths[row * width..][columns.clone()]);
-        let (least, most) = around
+        let (least, most) = around(depths, width, at, OUTLINE)
             .fold((f32::INFINITY, 0.0), |(least, most), depth| (depth.min(least), depth.max(most)));
         let own = depths[at];
         match own > EDGE * least {
@@ -258,7 +255,7 @@ mod tests {
         // A gap of two columns in what is in front.
         let gap = [key(1.0, 0), key(1.0, 1), key(3.0, 9), key(3.0, 9), key(1.0, 4), key(1.0, 5)];
         let found =
-            |row: [u64; 6], at: usize| source_of(&[row; 6].concat(), [6, 6], 18 + at).map(index_of);
+            |row: [u64; 6], at: usize| source_of(&[row; 6].concat(), 6, 18 + at).map(index_of);
         assert_eq!([1, 2, 3].map(|at| found(gap, at)), [Some(1), Some(0), Some(1)]);
         // Its edge.
         let edge = [key(1.0, 0), key(1.0, 1), key(1.0, 2), key(3.0, 3), key(3.0, 4), key(3.0, 5)];

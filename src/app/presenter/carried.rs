@@ -10,14 +10,13 @@ use crate::app::worker::{Activity, Request, Snapshot};
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::View;
-use crate::render::film::Film;
 use crate::render::keyframe::Keyframe;
 
 /// Most pixels that are carried for each picture of a movement.
 const MAX_PIXELS: u64 = 1 << 20;
-/// What is carried counts as so many samples a pixel; in a view through the same camera, as those it has, but no more
-/// than this. Once the picture has four times as many, it counts nothing.
+/// Weight of a carried picture in samples a pixel. It falls to zero while the new picture takes four times as many.
 const WORTH: f64 = 4.0;
+/// Largest weight of a picture of another size through the same camera; smaller if that has fewer samples.
 const MAX_WORTH: f64 = 64.0;
 /// Pixels along an edge of the blocks whose light is compared.
 const BLOCK: usize = 16;
@@ -44,10 +43,11 @@ impl Whole {
     fn new(snapshot: &Snapshot, image: Arc<Image>) -> Option<Self> {
         let (request, film) = (&snapshot.request, &snapshot.main.film);
         let keyframe = Keyframe::new(&request.world, &request.view, film, image)?;
-        Some(Self { request: Arc::clone(request), keyframe, samples: mean_samples(film) })
+        let samples = snapshot.main.mean_samples();
+        Some(Self { request: Arc::clone(request), keyframe, samples })
     }
 
-    /// How many samples a pixel it counts as in another view that has so many.
+    /// Its weight in samples a pixel beside a picture of `view` with `samples` of its own.
     fn worth(&self, view: &View, samples: f64) -> f64 {
         let is_resized = self.request.view.camera == view.camera;
         let worth = if is_resized { self.samples.min(MAX_WORTH) } else { WORTH };
@@ -56,13 +56,24 @@ impl Whole {
 }
 
 impl Carried {
+    /// Adds what was seen before to a picture, and keeps the result for the next ones.
+    pub(super) fn carry(&mut self, order: &Order, own: Prepared) -> Prepared {
+        if !order.latest().previews {
+            return own;
+        }
+        self.leave_others(order.latest());
+        let completed = self.complete(order, own);
+        if order.ahead.is_none() {
+            self.keep(&order.snapshot, completed.image.as_ref());
+        }
+        completed
+    }
+
     /// Keeps what is seen, if it is a whole picture at rest.
-    pub(super) fn keep(&mut self, snapshot: &Snapshot, image: Option<&Arc<Image>>) {
+    fn keep(&mut self, snapshot: &Snapshot, image: Option<&Arc<Image>>) {
         let (request, film) = (&snapshot.request, &snapshot.main.film);
-        let is_kept = snapshot.is_lasting()
-            && request.previews
-            && request.view.crop.is_none()
-            && film.min_samples() > 0;
+        let is_kept =
+            snapshot.is_lasting() && request.view.crop.is_none() && film.min_samples() > 0;
         if !is_kept {
             return;
         }
@@ -70,13 +81,13 @@ impl Carried {
         if self.last.as_ref().is_some_and(|last| last.request.view != request.view) {
             self.before = self.last.take();
         }
-        let samples = mean_samples(film);
+        let samples = snapshot.main.mean_samples();
         self.before.take_if(|before| before.worth(&request.view, samples) == 0.0);
         self.last = Whole::new(snapshot, image);
     }
 
     /// Lets go of pictures of another scene, or under another light.
-    pub(super) fn leave_others(&mut self, request: &Request) {
+    fn leave_others(&mut self, request: &Request) {
         for whole in [&mut self.last, &mut self.before] {
             whole.take_if(|whole| !whole.request.is_seen_like(request));
         }
@@ -84,24 +95,21 @@ impl Carried {
 
     /// A picture with what was seen before from elsewhere. A small one of a movement shows only what was not seen, in the
     /// view of `ahead` if that is newer; one at rest takes the place of what was seen as it gets samples.
-    pub(super) fn complete(&self, order: &Order, own: Prepared) -> Prepared {
+    fn complete(&self, order: &Order, own: Prepared) -> Prepared {
         let (snapshot, film) = (&order.snapshot, &order.snapshot.main.film);
-        let request = order.ahead.as_ref().unwrap_or(&snapshot.request);
+        let request = order.latest();
         let view = &request.view;
         let is_of_view = |last: &&Whole| last.request.view == *view;
         let shown = self.last.as_ref().filter(|last| request.moving || !is_of_view(last));
         let shown = shown.or(self.before.as_ref());
         let (Some(whole), Some(image)) = (shown, &own.image) else { return own };
-        if !request.previews || !whole.request.is_seen_like(request) {
-            return own;
-        }
         let is_complete = (image.width, image.height) == (view.width, view.height);
         let completed = if request.moving || !is_complete {
             let view = carried_view(view);
             let met = Some(&**film).filter(|_| order.ahead.is_none());
             under(&whole.keyframe.seen_in(&view, met), image, [view.width, view.height])
         } else {
-            let samples = mean_samples(film);
+            let samples = snapshot.main.mean_samples();
             let worth = whole.worth(view, samples);
             let is_compared = order.compared.is_some() || snapshot.plain.is_some();
             let is_raw = order.denoiser.is_none() && snapshot.is_whole();
@@ -118,11 +126,6 @@ impl Carried {
             ..Prepared::of(&order.developer, completed)
         }
     }
-}
-
-/// Samples a pixel.
-fn mean_samples(film: &Film) -> f64 {
-    film.total_samples() as f64 / film.pixels().len().max(1) as f64
 }
 
 /// A movement's view in the size in which pictures are carried.
@@ -144,7 +147,7 @@ fn under(seen: &[Option<[f32; 3]>], small: &Image, [width, height]: [u32; 2]) ->
     Image { width, height, pixels }
 }
 
-/// A picture together with what is seen, where both agree; then the picture counts so many times as much.
+/// The mean of a picture and of what is seen, where both agree. The picture has `times` the weight.
 fn faded(seen: &[Option<[f32; 3]>], own: &Image, times: f32) -> Image {
     let agreement = agreement(seen, own);
     let color = |((at, seen), own_): ((usize, &Option<[f32; 3]>), &[f32; 3])| {
@@ -190,10 +193,12 @@ mod tests {
 
     use super::*;
     use crate::app::presenter::source::tests::session;
+    use crate::app::worker::SessionSnapshot;
     use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::denoise::Denoiser;
     use crate::develop::tests::developer;
-    use crate::render::Session;
+    use crate::render::film::Film;
+    use crate::render::{Figures, Session};
 
     fn rendered(request: &Request, size: [u32; 2], samples: u32) -> Film {
         let view = View { layers: true, ..request.view.of_size(size[0], size[1]) };
@@ -209,7 +214,9 @@ mod tests {
         let still = request_of("office", [48, 36]);
         let film = rendered(&still, [48, 36], 4);
         let snapshot = |request: &Request, film: &Film| {
-            snapshot_of(&Arc::new(request.clone()), session(film.clone()))
+            let figures = Figures { samples: film.total_samples(), ..Figures::default() };
+            let session = SessionSnapshot { figures, ..session(film.clone()) };
+            snapshot_of(&Arc::new(request.clone()), session)
         };
         let mut carried = Carried::default();
         let own = |film: &Film| {

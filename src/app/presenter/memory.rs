@@ -90,11 +90,10 @@ impl Memory {
         }
         self.leave_what_is_not_in(order);
         let source = Source::main(order);
-        self.carried.leave_others(&order.snapshot.request);
         let prepare = || Ok(source.prepare(&developer));
         let own = self.uploads.picture.or_make(source.key(), prepare)?;
         let key = (source.key(), order.ahead.as_ref().map(|ahead| Arc::as_ptr(ahead) as usize));
-        let complete = || Ok(self.carried.complete(order, own));
+        let complete = || Ok(self.carried.carry(order, own));
         let Prepared { mut picture, image, is_carried, mut failure } =
             self.uploads.completed.or_make(key, complete)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
@@ -145,9 +144,6 @@ impl Memory {
             let prepare = || Ok(source.prepare(&developer));
             let plain = self.uploads.plain.or_make(source.key(), prepare)?;
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
-        }
-        if order.compared.is_none() && order.ahead.is_none() {
-            self.carried.keep(&order.snapshot, image.as_ref());
         }
         developer.gpu().check()?;
         let (overlay, words) =

@@ -58,6 +58,11 @@ impl Order {
         Self { snapshot: Arc::new(snapshot), ..self.clone() }
     }
 
+    /// What the picture is to be of.
+    pub(super) fn latest(&self) -> &Arc<Request> {
+        self.ahead.as_ref().unwrap_or(&self.snapshot.request)
+    }
+
     /// Whether what is kept is shown where the picture that is rendered would be.
     pub(in crate::app) fn covers_now(&self) -> bool {
         self.compared.as_ref().is_some_and(Comparison::covers_now)

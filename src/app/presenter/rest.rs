@@ -6,7 +6,7 @@ use std::time::Duration;
 /// is much better than the last, and most after [`MAX_REST_AFTER`]. With all of the cores it then takes a
 /// seventeenth of the machine.
 const REST: [f64; 2] = [3.0, 16.0];
-/// After a picture of a movement it rests so many times as long as that took: eyes follow it.
+/// Rest after a moving camera's picture, over the time that picture took: short, since eyes follow it.
 pub(super) const MOVING_REST: f64 = 0.5;
 /// Seconds of work on a view after which pictures change slowly.
 const MAX_REST_AFTER: f64 = 12.0;
