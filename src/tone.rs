@@ -2,6 +2,8 @@
 
 mod white_balance;
 
+use std::fmt;
+
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -28,20 +30,15 @@ pub enum ToneCurve {
     None,
 }
 
+impl fmt::Display for ToneCurve {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
 impl ToneCurve {
     /// All curves.
     pub const ALL: [Self; 5] = [Self::Agx, Self::Aces, Self::Neutral, Self::Reinhard, Self::None];
-
-    /// Its name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Agx => "agx",
-            Self::Aces => "aces",
-            Self::Neutral => "neutral",
-            Self::Reinhard => "reinhard",
-            Self::None => "none",
-        }
-    }
 
     /// Linear display light in `[0,1]` of exposed linear Rec.709. NaN and negative channels count
     /// as 0, and values above `1e6` as `1e6`; so the result is never NaN.

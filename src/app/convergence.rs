@@ -65,10 +65,10 @@ impl Convergence {
 }
 
 /// What a person calls a way of sampling.
-pub(crate) fn name_of(sampling: Sampling) -> &'static str {
+pub(crate) fn name_of(sampling: Sampling) -> String {
     match sampling {
-        Sampling::Bsdf => "BSDF",
-        other => other.name(),
+        Sampling::Bsdf => "BSDF".to_owned(),
+        other => other.to_string(),
     }
 }
 

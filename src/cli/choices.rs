@@ -187,7 +187,7 @@ mod tests {
             assert_eq!(TableKind::from_str(&kind.to_string(), false), Ok(kind));
         }
         for curve in ToneCurve::ALL {
-            assert_eq!(ToneCurve::from_str(curve.name(), false), Ok(curve));
+            assert_eq!(ToneCurve::from_str(&curve.to_string(), false), Ok(curve));
         }
     }
 }

@@ -151,7 +151,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.overlay.is_some_and(Overlay::is_of_grid) && !learns {
         return Err(Error::new(format!(
             "--sampling {} learns nothing that this overlay could show",
-            arguments.sampling.name()
+            arguments.sampling
         )));
     }
     if arguments.overlay == Some(Overlay::Tile) && arguments.tile.is_none() {

@@ -28,12 +28,7 @@ impl TableKind {
 
 impl fmt::Display for TableKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::TileLocal => "tile-local",
-            Self::U32 => "u32",
-            Self::F32 => "f32",
-            Self::F64 => "f64",
-        })
+        self.serialize(f)
     }
 }
 

@@ -184,7 +184,7 @@ pub fn write_picture(
         metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
     }
     metadata.extend(filter_metadata(options, films));
-    metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
+    metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.to_string()));
     let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
         return write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata);
     };

@@ -1,5 +1,7 @@
 //! What is to be rendered and how.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::filter::PixelFilter;
@@ -26,15 +28,9 @@ pub enum Sampling {
     Bsdf,
 }
 
-impl Sampling {
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Adaptive => "adaptive",
-            Self::Talk => "talk",
-            Self::Plain => "plain",
-            Self::Bsdf => "bsdf",
-        }
+impl fmt::Display for Sampling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
     }
 }
 

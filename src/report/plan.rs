@@ -125,7 +125,7 @@ pub struct Method {
 impl Method {
     /// A sampling mode with its name on the command line.
     pub fn of(sampling: Sampling) -> Self {
-        Self { name: sampling.name().to_owned(), group: None, settings: Settings::of(sampling) }
+        Self { name: sampling.to_string(), group: None, settings: Settings::of(sampling) }
     }
 
     /// The same method with this way of finding indirect light.

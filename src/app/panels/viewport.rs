@@ -408,7 +408,7 @@ fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
             speed_up.ratio * speed_up.factor
         )
     });
-    wipe_labels(ui, rect, &[plain, label(name, &snapshot.main)], speed_up.as_deref());
+    wipe_labels(ui, rect, &[plain, label(&name, &snapshot.main)], speed_up.as_deref());
 }
 
 /// A ring where the inspector stays.

@@ -303,7 +303,7 @@ fn identity(
         ("--region", format!("{:?}", view.crop)),
         ("--seed", view.seed.to_string()),
         ("--filter", format!("{:?}", view.filter)),
-        ("--sampling", view.sampling.name().to_owned()),
+        ("--sampling", view.sampling.to_string()),
         ("--sharing", format!("{:?}", arguments.sharing())),
         ("--bounces", bounces.to_string()),
         ("--no-russian-roulette", (!russian_roulette).to_string()),
