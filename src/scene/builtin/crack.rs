@@ -66,7 +66,7 @@ pub(super) fn build() -> Scene {
         });
     }
     b.camera("slit", [1.75, 1.35, 1.30], [-1.0, 0.82, -0.45], 58.0);
-    std::mem::replace(b, Builder::new("")).finish()
+    b.finish()
 }
 
 /// A boarded crate of `size` with corner battens.

@@ -27,6 +27,11 @@ impl Builder {
                 self.vertex((surface(u, v), normal, Vec2::new(u, v) * uv_size));
             }
         }
+        self.join(mat, first, [nu, nv]);
+    }
+
+    /// Joins the vertices from `first` on, which stand row by row, to a grid of `nu` x `nv` quads.
+    fn join(&mut self, mat: Mat, first: u32, [nu, nv]: [u32; 2]) {
         for j in 0..nv {
             for i in 0..nu {
                 let a = first + j * (nu + 1) + i;
@@ -67,11 +72,7 @@ impl Builder {
                     ));
                 }
             }
-            for k in 0..segments {
-                let a = first + 2 * k;
-                self.triangle(mat, [a, a + 1, a + 3]);
-                self.triangle(mat, [a, a + 3, a + 2]);
-            }
+            self.join(mat, first, [1, segments]);
             length = next;
         }
     }
@@ -121,15 +122,9 @@ impl Builder {
                 ));
             }
         }
-        let ring = segments + 1;
-        for i in 0..path.len() as u32 - 1 {
-            for k in 0..segments {
-                let a = first + i * ring + k;
-                self.triangle(mat, [a, a + 1, a + ring + 1]);
-                self.triangle(mat, [a, a + ring + 1, a + ring]);
-            }
-        }
-        let last = first + (path.len() as u32 - 1) * ring;
+        let pieces = path.len() as u32 - 1;
+        self.join(mat, first, [segments, pieces]);
+        let last = first + pieces * (segments + 1);
         for (start, outward) in [(first, -tangent(0)), (last, tangent(path.len() - 1))] {
             let local = self.world_from_part.inverse();
             let cap: Vec<Corner> = (start..start + segments)
@@ -178,13 +173,7 @@ impl Builder {
                     ));
                 }
             }
-            for row in 0..n {
-                for column in 0..n {
-                    let a = first + row * (n + 1) + column;
-                    self.triangle(mat, [a, a + 1, a + n + 2]);
-                    self.triangle(mat, [a, a + n + 2, a + n + 1]);
-                }
-            }
+            self.join(mat, first, [n, n]);
         }
     }
 

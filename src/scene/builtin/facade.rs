@@ -27,31 +27,22 @@ pub(super) struct HouseMats {
     pub(super) shutter: Option<Mat>,
 }
 
-/// A front's windows: columns about [`BAY`] apart on `floors` floors, `ground` metres up to the first.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rhythm {
-    /// Floors above the ground floor.
-    pub(super) floors: u32,
-    /// Height of the ground floor in metres.
-    pub(super) ground: f32,
-    /// Whether the ground floor has shop windows.
-    pub(super) shops: bool,
-}
-
 /// Usual distance of windows in metres.
 const BAY: f32 = 3.0;
 /// How far fronts stand before the core.
 const FRONT: f32 = 0.28;
+/// Height of a ground floor in metres.
+const GROUND: f32 = 3.6;
 
 /// A house over `[x0, x1] x [z0, z1]` of `height`; fronts with windows on the sides marked in
-/// the order -X, +X, -Z, +Z.
+/// the order -X, +X, -Z, +Z, on so many floors above the ground floor, which has shop windows or not.
 pub(super) fn house(
     b: &mut Builder,
     m: &HouseMats,
     [x0, z0, x1, z1]: [f32; 4],
     height: f32,
     fronts: [bool; 4],
-    rhythm: Rhythm,
+    windows: (u32, bool),
 ) {
     let inset = fronts.map(|front| if front { FRONT - 0.02 } else { 0.0 });
     b.slab(
@@ -70,7 +61,7 @@ pub(super) fn house(
         if fronts[side] {
             // Seen from the street the front looks "into the room".
             let wall = Wall { origin, along, width };
-            b.part(wall.frame(), |b| front(b, m, [width, height], rhythm, side));
+            b.part(wall.frame(), |b| front(b, m, [width, height], windows, side));
         }
     }
     let over = 0.28;
@@ -89,40 +80,46 @@ pub(super) fn house(
     b.slab(m.roof, [x0 + 0.1, height, z0 + 0.1], [x1 - 0.1, height + 0.5, z1 - 0.1], 0.05);
 }
 
-fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhythm, side: usize) {
+fn front(
+    b: &mut Builder,
+    m: &HouseMats,
+    [width, height]: [f32; 2],
+    (floors, shops): (u32, bool),
+    side: usize,
+) {
     let bays = (width / BAY).round().max(1.0) as u32;
     let bay = width / bays as f32;
-    let storey = (height - rhythm.ground - 0.4) / rhythm.floors as f32;
+    let storey = (height - GROUND - 0.4) / floors as f32;
     let (w, h) = ((0.42 * bay).min(1.15), (0.60 * storey).min(1.9));
     let mut windows = Vec::new();
     for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
-        for j in 0..rhythm.floors {
-            let sill = rhythm.ground + storey * j as f32 + 0.24 * storey;
+        for j in 0..floors {
+            let sill = GROUND + storey * j as f32 + 0.24 * storey;
             windows.push([middle - 0.5 * w, sill, middle + 0.5 * w, sill + h]);
         }
     }
     let mut openings = Vec::new();
     for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
-        let half = if rhythm.shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
+        let half = if shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
         let is_door = i % 3 == 1;
         let sill = if is_door {
             0.02
-        } else if rhythm.shops {
+        } else if shops {
             0.55
         } else {
             1.0
         };
         let half = if is_door { 0.55 } else { half };
-        openings.push(([middle - half, sill, middle + half, 0.80 * rhythm.ground], is_door));
+        openings.push(([middle - half, sill, middle + half, 0.80 * GROUND], is_door));
     }
     let holes: Vec<Hole> =
         windows.iter().copied().chain(openings.iter().map(|o| o.0)).map(Hole::Rectangle).collect();
     // Each front ends a little behind the face of its neighbour.
     let reach = if side < 2 { -0.006 } else { -0.004 };
     pierced(b, m.wall, [-reach, -0.03, width + reach, height - 0.1], FRONT, &holes);
-    b.slab(m.trim, [-0.03, rhythm.ground - 0.14, -0.05], [width + 0.03, rhythm.ground, 0.07], 0.02);
+    b.slab(m.trim, [-0.03, GROUND - 0.14, -0.05], [width + 0.03, GROUND, 0.07], 0.02);
     plinth(b, m.base, width, &openings);
     for window in &windows {
         window_frame(b, m.frame, *window, 0.12, [2, 3], 0.0);
@@ -132,7 +129,7 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
         if *is_door {
             door_leaf(b, m, *opening);
         } else {
-            window_frame(b, m.frame, *opening, 0.10, [if rhythm.shops { 3 } else { 2 }, 2], 0.0);
+            window_frame(b, m.frame, *opening, 0.10, [if shops { 3 } else { 2 }, 2], 0.0);
             sill(b, m.trim, *opening);
         }
         let [u0, _, u1, v1] = *opening;

@@ -5,6 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::{Affine3A, Vec2, Vec3};
 
 use super::mesh::{Builder, LIFT, Mat};
+use super::room::Wall;
 
 /// A wooden window frame without panes in a wall's frame: `hole` as given to the wall, sitting
 /// `depth` behind the inner face, with `columns` x `rows` lights and edges rounded by `bevel`.
@@ -48,26 +49,35 @@ pub(super) fn window_board(b: &mut Builder, mat: Mat, hole: [f32; 4], thickness:
     b.slab(mat, [u0 - 0.06, v0 - 0.018, -0.01], [u1 + 0.06, v0 + 0.014, 0.07], 0.008);
 }
 
-/// A flat moulding around an opening on the room's side, open at the bottom if `to_floor`.
-pub(super) fn architrave(b: &mut Builder, mat: Mat, hole: [f32; 4], to_floor: bool) {
-    let [u0, v0, u1, v1] = hole;
+/// A flat moulding around a door on the room's side.
+fn architrave(b: &mut Builder, mat: Mat, [u0, v0, u1, v1]: [f32; 4]) {
     let (w, z) = (0.07, [-0.005, 0.018]);
-    let foot = if to_floor { v0 } else { v0 - w };
-    b.slab(mat, [u0 - w, foot, z[0]], [u0, v1 + w, z[1]], 0.006);
-    b.slab(mat, [u1, foot, z[0]], [u1 + w, v1 + w, z[1]], 0.006);
+    b.slab(mat, [u0 - w, v0, z[0]], [u0, v1 + w, z[1]], 0.006);
+    b.slab(mat, [u1, v0, z[0]], [u1 + w, v1 + w, z[1]], 0.006);
     b.slab(mat, [u0 - 0.003, v1 + 0.0006, z[0]], [u1 + 0.003, v1 + w - 0.001, z[1] - 0.001], 0.006);
-    if !to_floor {
-        b.slab(
-            mat,
-            [u0 - 0.003, foot + 0.001, z[0]],
-            [u1 + 0.003, v0 - 0.0006, z[1] - 0.001],
-            0.006,
-        );
+}
+
+/// Skirting and cornices along the walls of a room, `heights` high; the last wall has a door between `door` along it.
+pub(super) fn edges(
+    b: &mut Builder,
+    walls: &[Wall; 4],
+    [skirting_mat, cornice_mat]: [Mat; 2],
+    ceiling: f32,
+    door: [f32; 2],
+    heights: [f32; 2],
+) {
+    for (i, wall) in walls.iter().enumerate() {
+        b.part(wall.frame(), |b| {
+            let (beside, whole) = ([[0.0, door[0]], [door[1], wall.width]], [[0.0, wall.width]]);
+            let stretches: &[[f32; 2]] = if i == 3 { &beside } else { &whole };
+            skirting(b, skirting_mat, stretches, heights[0]);
+            cornice(b, cornice_mat, wall.width, ceiling + 0.004, heights[1]);
+        });
     }
 }
 
 /// Skirting along a wall between the given stretches (u from, u to), in the wall's frame.
-pub(super) fn skirting(b: &mut Builder, mat: Mat, stretches: &[[f32; 2]], height: f32) {
+fn skirting(b: &mut Builder, mat: Mat, stretches: &[[f32; 2]], height: f32) {
     for &[u0, u1] in stretches {
         b.slab(mat, [u0, -0.01, -0.01], [u1, height - 0.025, 0.018], 0.002);
         b.slab(mat, [u0 + 0.0005, height - 0.03, -0.009], [u1 - 0.0005, height, 0.012], 0.006);
@@ -75,7 +85,7 @@ pub(super) fn skirting(b: &mut Builder, mat: Mat, stretches: &[[f32; 2]], height
 }
 
 /// A quarter-round ceiling moulding along a wall of `width`, in the wall's frame.
-pub(super) fn cornice(b: &mut Builder, mat: Mat, width: f32, height: f32, radius: f32) {
+fn cornice(b: &mut Builder, mat: Mat, width: f32, height: f32, radius: f32) {
     b.sheet(mat, [1, 12], Vec2::new(width, radius), |u, v| {
         let (s, c) = (v * 0.5 * PI).sin_cos();
         let swell = 0.12 * radius * (v * TAU).sin();
@@ -107,10 +117,12 @@ pub(super) fn panel_moulding(b: &mut Builder, mat: Mat, [u0, v0, u1, v1]: [f32; 
 /// its left edge at `u`.
 pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, height]: [f32; 2]) {
     b.slab(leaf, [u + 0.003, 0.005, -0.01], [u + width - 0.003, height - 0.003, 0.010], 0.003);
-    architrave(b, leaf, [u, 0.001, u + width, height], true);
+    architrave(b, leaf, [u, 0.001, u + width, height]);
     let (stile, middle) = (0.11, 0.92);
     for [v0, v1] in [[0.22, middle - 0.06], [middle + 0.06, height - 0.12]] {
-        panel_moulding_at(b, leaf, [u + stile, v0, u + width - stile, v1], 0.010);
+        b.part(Affine3A::from_translation(Vec3::Z * 0.010), |b| {
+            panel_moulding(b, leaf, [u + stile, v0, u + width - stile, v1]);
+        });
         b.slab(
             leaf,
             [u + stile + 0.06, v0 + 0.06, 0.0],
@@ -135,11 +147,6 @@ pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, heigh
             (grip - Vec3::X * 0.003, 0.004),
         ],
     );
-}
-
-/// [`panel_moulding`] raised to stand on a leaf of thickness `z`.
-fn panel_moulding_at(b: &mut Builder, mat: Mat, panel: [f32; 4], z: f32) {
-    b.part(Affine3A::from_translation(Vec3::Z * z), |b| panel_moulding(b, mat, panel));
 }
 
 /// A curtain that hangs from `top` to `bottom` between `u` in a wall's frame, `offset` before the wall,

@@ -130,19 +130,8 @@ impl Palette {
 /// Linear colour of a warm lamp.
 const WARM: Vec3 = Vec3::new(1.0, 0.62, 0.30);
 
-/// Builds the scene `living-room`.
-pub(super) fn build() -> Scene {
-    furnished("living-room", [0.0; 3])
-}
-
-/// Builds the scene `evening`, lit by its shades and bulbs; `sky:night` adds less than a thousandth of the light
-/// of a wall by the window.
-pub(super) fn evening() -> Scene {
-    furnished("evening", [0.6, 25.0, 40.0])
-}
-
-/// The room, its shades, bulbs and bright bulb shining with this radiance.
-fn furnished(name: &str, lamps: [f32; 3]) -> Scene {
+/// Builds the room, its shades, bulbs and bright bulb shining with this radiance.
+pub(super) fn build(name: &str, lamps: [f32; 3]) -> Scene {
     let b = &mut Builder::new(name);
     let m = &Palette::new(b, lamps);
     shell(b, m);
@@ -155,7 +144,7 @@ fn furnished(name: &str, lamps: [f32; 3]) -> Scene {
     b.camera("window", [-2.6, 1.35, 1.95], [0.5, 1.02, -0.55], 50.0);
     b.camera("sofa", [1.95, 1.35, 2.25], [-0.95, 0.88, -1.1], 50.0);
     b.camera("round window", [2.5, 1.42, -1.35], [-1.0, 1.15, 1.75], 54.0);
-    std::mem::replace(b, Builder::new("")).finish()
+    b.finish()
 }
 
 fn shell(b: &mut Builder, m: &Palette) {
@@ -164,14 +153,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     let holes: [&[Hole]; 4] = [&[], &[Hole::Rectangle(WINDOW)], &[], &[Hole::Round(ROUND)]];
     room::room(b, &shell, SIZE, THICKNESS, holes);
     let walls = room::walls(SIZE);
-    for (i, wall) in walls.iter().enumerate() {
-        b.part(wall.frame(), |b| {
-            let (door_gap, whole) = ([[0.0, 0.43], [1.47, 6.0]], [[0.0, wall.width]]);
-            let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
-            fittings::skirting(b, m.white, stretches, 0.12);
-            fittings::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.10);
-        });
-    }
+    fittings::edges(b, &walls, [m.white, m.ceiling], SIZE[1], [0.43, 1.47], [0.12, 0.10]);
     b.part(walls[2].frame(), |b| {
         for u in [0.25, 1.65, 3.05, 4.45] {
             fittings::panel_moulding(b, m.accent, [u, 0.30, u + 1.25, 1.02]);

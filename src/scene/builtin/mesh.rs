@@ -33,11 +33,11 @@ impl Builder {
     }
 
     /// The scene as built, with tangents if it has normal maps.
-    pub(super) fn finish(mut self) -> Scene {
+    pub(super) fn finish(&mut self) -> Scene {
         if self.scene.materials.iter().any(Material::has_normal_map) {
             self.add_tangents();
         }
-        self.scene
+        std::mem::take(&mut self.scene)
     }
 
     /// Adds a material.

@@ -6,6 +6,7 @@ use glam::{Affine3A, Vec2, Vec3};
 
 use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
+use super::tableware::spline;
 use crate::noise::Stream;
 
 /// Cloth and paper covers, linear albedo.
@@ -127,14 +128,9 @@ pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
     const STEPS: u32 = 24;
     let last = radii.len() as f32 - 1.0;
     let radius = |t: f32| {
-        // Catmull-Rom through the given radii.
         let x = (t * last).clamp(0.0, last - 1e-4);
-        let i = x as usize;
-        let at = |k: isize| radii[(i as isize + k).clamp(0, last as isize) as usize];
-        let (p0, p1, p2, p3, f) = (at(-1), at(0), at(1), at(2), x.fract());
-        0.5 * (2.0 * p1
-            + f * (p2 - p0
-                + f * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + f * (3.0 * p1 - p0 - 3.0 * p2 + p3))))
+        let at = |k: isize| radii[(x as isize + k).clamp(0, last as isize) as usize];
+        spline([-1, 0, 1, 2].map(|k| Vec2::new(at(k), 0.0)), x.fract()).x
     };
     let wall = 0.014;
     let mut profile = vec![(0.0, 0.0), (radii[0] * height - 0.002, 0.0)];

@@ -120,7 +120,7 @@ pub(super) fn build() -> Scene {
     b.camera("desks", [2.65, 1.5, 1.62], [-1.0, 0.98, -0.92], 50.0);
     b.camera("windows", [2.3, 1.45, -0.1], [-2.9, 1.15, 0.05], 56.0);
     b.camera("door", [-2.5, 1.5, -0.9], [1.9, 1.0, 1.3], 56.0);
-    std::mem::replace(b, Builder::new("")).finish()
+    b.finish()
 }
 
 fn shell(b: &mut Builder, m: &Palette) {
@@ -129,14 +129,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     let windows = WINDOWS.map(Hole::Rectangle);
     room::room(b, &shell, SIZE, THICKNESS, [&windows, &[], &[], &[]]);
     let walls = room::walls(SIZE);
-    for (i, wall) in walls.iter().enumerate() {
-        b.part(wall.frame(), |b| {
-            let (door_gap, whole) = ([[0.0, 0.33], [1.37, 6.0]], [[0.0, wall.width]]);
-            let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
-            fittings::skirting(b, m.white, stretches, 0.10);
-            fittings::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.07);
-        });
-    }
+    fittings::edges(b, &walls, [m.white, m.ceiling], SIZE[1], [0.33, 1.37], [0.10, 0.07]);
     b.part(walls[0].frame(), |b| {
         for hole in WINDOWS {
             fittings::window_frame(b, m.white, hole, 0.09, [2, 1], 0.004);

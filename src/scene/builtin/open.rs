@@ -49,7 +49,7 @@ pub(super) fn build() -> Scene {
         objects::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13]);
     });
     b.camera("terrace", [0.6, 1.6, 6.0], [0.0, 0.78, 0.0], 40.0);
-    std::mem::replace(b, Builder::new("")).finish()
+    b.finish()
 }
 
 /// A block in two steps.

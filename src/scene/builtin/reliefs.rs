@@ -1,9 +1,8 @@
 //! Procedural normal maps: tangent-space slopes of heights that belong to the colours of `textures`.
 
 use glam::{IVec2, Vec2};
-use rayon::prelude::*;
 
-use super::textures::{Board, TIMBER, Thread, fibres};
+use super::textures::{Board, TIMBER, Thread, fibres, texel_by_texel};
 use crate::noise::tiling_fbm;
 use crate::scene::TextureImage;
 
@@ -14,29 +13,16 @@ fn relief(
     size: Vec2,
     surface: impl Fn(Vec2) -> f32 + Sync,
 ) -> TextureImage {
-    let rows = |y: u32| {
-        let surface = &surface;
-        (0..width).map(move |x| {
-            surface(Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32))
-        })
-    };
-    let heights: Vec<f32> = (0..height).into_par_iter().flat_map_iter(rows).collect();
+    let heights = texel_by_texel([width, height], |uv, _| surface(uv));
     let at = |x: u32, y: u32| heights[((y % height) * width + x % width) as usize];
     // Central differences over two texels.
     let scale = 0.5 * Vec2::new(width as f32, height as f32) / size;
     let byte = |x: f32| (127.5 + 127.5 * x).round() as u8;
-    let texels = (0..height)
-        .into_par_iter()
-        .flat_map_iter(|y| {
-            let (at, byte) = (&at, &byte);
-            (0..width).map(move |x| {
-                let along = at(x + width - 1, y) - at(x + 1, y);
-                let across = at(x, y + height - 1) - at(x, y + 1);
-                let n = (Vec2::new(along, across) * scale).extend(1.0).normalize();
-                [byte(n.x), byte(n.y), byte(n.z)]
-            })
-        })
-        .collect::<Vec<_>>();
+    let texels = texel_by_texel([width, height], |_, [x, y]| {
+        let along = at(x + width - 1, y) - at(x + 1, y);
+        let across = at(x, y + height - 1) - at(x, y + 1);
+        (Vec2::new(along, across) * scale).extend(1.0).normalize().to_array().map(byte)
+    });
     TextureImage { width, height, texels: texels.into() }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn build() -> Scene {
         (turn * Vec3::from(p)).to_array()
     };
     b.camera("still life", place([0.16, 1.34, 2.78]), place([0.0, 0.97, 0.0]), 23.0);
-    std::mem::replace(b, Builder::new("")).finish()
+    b.finish()
 }
 
 /// Wood and plaster, with normal maps.

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::facade::{self, HouseMats, Rhythm};
+use super::facade::{self, HouseMats};
 use super::materials::{self, matte, textured, two_sided};
 use super::mesh::{Builder, Mat};
 use super::objects;
@@ -125,59 +125,24 @@ fn street(name: &str) -> Builder {
     arcade(b, m);
     cafe(b, m);
     greenery(b, m);
-    for z in [-24.0, -17.0, -10.0, -3.0, 4.0] {
-        b.standing(Vec3::new(2.55, 0.0, z), 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
-    }
-    for z in [-20.5, -13.5] {
-        b.standing(Vec3::new(-1.75, 0.0, z), 0.0, |b| {
-            lamps::street_lamp(b, m.iron, m.lantern, 3.7);
-        });
+    let (right, left) = (2.55, -1.75);
+    let on_right = [-24.0, -17.0, -10.0, -3.0, 4.0].map(|z| (right, z));
+    for (x, z) in on_right.into_iter().chain([(left, -20.5), (left, -13.5)]) {
+        b.standing(Vec3::new(x, 0.0, z), 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
     }
     builder
 }
 
 fn houses(b: &mut Builder, m: &Palette) {
-    let row = |floors, shops| Rhythm { floors, ground: 3.6, shops };
-    facade::house(
-        b,
-        &m.brick_house,
-        [-14.0, -30.0, -6.0, -8.0],
-        11.0,
-        [false, true, false, true],
-        row(2, true),
-    );
-    facade::house(
-        b,
-        &m.pale_house,
-        [5.0, -34.0, 14.0, -10.0],
-        14.0,
-        [true, false, false, true],
-        row(3, true),
-    );
-    facade::house(
-        b,
-        &m.stone_house,
-        [-5.0, -41.0, 4.0, -35.0],
-        18.0,
-        [false, false, false, true],
-        row(4, false),
-    );
-    facade::house(
-        b,
-        &m.ochre_house,
-        [-16.0, -6.0, -7.0, 9.0],
-        9.0,
-        [false, true, true, false],
-        row(2, true),
-    );
-    facade::house(
-        b,
-        &m.ochre_house,
-        [7.0, -7.5, 16.0, 9.0],
-        6.6,
-        [true, false, true, false],
-        row(1, false),
-    );
+    for (mats, plan, height, fronts, windows) in [
+        (&m.brick_house, [-14.0, -30.0, -6.0, -8.0], 11.0, [false, true, false, true], (2, true)),
+        (&m.pale_house, [5.0, -34.0, 14.0, -10.0], 14.0, [true, false, false, true], (3, true)),
+        (&m.stone_house, [-5.0, -41.0, 4.0, -35.0], 18.0, [false, false, false, true], (4, false)),
+        (&m.ochre_house, [-16.0, -6.0, -7.0, 9.0], 9.0, [false, true, true, false], (2, true)),
+        (&m.ochre_house, [7.0, -7.5, 16.0, 9.0], 6.6, [true, false, true, false], (1, false)),
+    ] {
+        facade::house(b, mats, plan, height, fronts, windows);
+    }
 }
 
 /// A vaulted walk along the houses on the +X side.
@@ -236,12 +201,9 @@ fn cafe(b: &mut Builder, m: &Palette) {
             b.drum(m.iron, [0.0, 0.03], [0.22, 0.20], 0.008);
             b.drum(m.iron, [0.02, 0.70], [0.025, 0.022], 0.004);
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
-            b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| {
-                objects::mug(b, m.ceramic, m.coffee);
-            });
-            b.standing(Vec3::new(-0.15, 0.728, 0.10), 200.0, |b| {
-                objects::mug(b, m.ceramic, m.coffee);
-            });
+            for (x, z, yaw) in [(0.12, 0.05, 60.0), (-0.15, 0.10, 200.0)] {
+                b.standing(Vec3::new(x, 0.728, z), yaw, |b| objects::mug(b, m.ceramic, m.coffee));
+            }
             b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
                 b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);
                 plants::foliage(

@@ -13,16 +13,17 @@ pub(super) fn smooth(points: &[(f32, f32)], steps: u32) -> Vec<(f32, f32)> {
     (0..=last as u32 * steps)
         .map(|k| {
             let (i, f) = ((k / steps) as isize, (k % steps) as f32 / steps as f32);
-            // Catmull and Rom's spline.
-            let [p0, p1, p2, p3] = [i - 1, i, i + 1, i + 2].map(point);
-            let p = 0.5
-                * (2.0 * p1
-                    + f * (p2 - p0
-                        + f * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3
-                            + f * (3.0 * p1 - p0 - 3.0 * p2 + p3))));
+            let p = spline([i - 1, i, i + 1, i + 2].map(point), f);
             (p.x.max(0.0), p.y)
         })
         .collect()
+}
+
+/// Catmull and Rom's spline, `f` of the way from the second point to the third.
+pub(super) fn spline([p0, p1, p2, p3]: [Vec2; 4], f: f32) -> Vec2 {
+    0.5 * (2.0 * p1
+        + f * (p2 - p0
+            + f * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + f * (3.0 * p1 - p0 - 3.0 * p2 + p3))))
 }
 
 /// A teapot 15 cm high, its spout along +X.

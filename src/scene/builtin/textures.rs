@@ -15,20 +15,21 @@ fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureIma
         .map(|i| (255.0 * srgb_from_linear(i as f32 / STEPS as f32) + 0.5) as u8)
         .collect();
     let byte = |x: f32| encode[(x.clamp(0.0, 1.0) * STEPS as f32) as usize];
-    let texels = (0..height)
-        .into_par_iter()
-        .flat_map_iter(|y| {
-            let f = &f;
-            let byte = &byte;
-            (0..width).map(move |x| {
-                let uv =
-                    Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-                let c = f(uv);
-                [byte(c.x), byte(c.y), byte(c.z)]
-            })
-        })
-        .collect::<Vec<_>>();
+    let texels = texel_by_texel([width, height], |uv, _| f(uv).to_array().map(byte));
     TextureImage { width, height, texels: texels.into() }
+}
+
+/// What `f` says of each texel of an image: of the middle of it as (u, v), and of its column and row.
+pub(super) fn texel_by_texel<T: Send>(
+    [width, height]: [u32; 2],
+    f: impl Fn(Vec2, [u32; 2]) -> T + Sync,
+) -> Vec<T> {
+    let size = Vec2::new(width as f32, height as f32);
+    let row = |y: u32| {
+        let f = &f;
+        (0..width).map(move |x| f(Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / size, [x, y]))
+    };
+    (0..height).into_par_iter().flat_map_iter(row).collect()
 }
 
 /// Seed of the wood of `timber`.
