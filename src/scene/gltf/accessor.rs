@@ -58,18 +58,14 @@ impl<'a> Elements<'a> {
         let count = usize::try_from(accessor.count.0).map_err(|_| "its count is too large")?;
         let (component, components) = (component.0, kind.multiplicity());
         let size = component.size() * components;
-        let base = match accessor.buffer_view {
-            Some(view) => Some(Strided::open(file, view, accessor.byte_offset, size, count)?),
-            None => None,
-        };
+        let open = |view| Strided::open(file, view, accessor.byte_offset, size, count);
+        let base = accessor.buffer_view.map(open).transpose()?;
         // Zeros cost no bytes, so a count of them must be held against something that does.
         if base.is_none() && count > file.total_bytes() {
             return Err(format!("{count} elements are claimed without any data"));
         }
-        let sparse = match &accessor.sparse {
-            Some(sparse) => Some(Sparse::open(file, sparse, size, count)?),
-            None => None,
-        };
+        let sparse = accessor.sparse.as_ref();
+        let sparse = sparse.map(|it| Sparse::open(file, it, size, count)).transpose()?;
         Ok(Self { count, components, component, normalized: accessor.normalized, base, sparse })
     }
 
@@ -100,23 +96,25 @@ impl<'a> Elements<'a> {
 
     /// The first `N` components of an element, zeros where it has fewer or does not exist.
     pub(super) fn floats<const N: usize>(&self, element: usize) -> [f32; N] {
-        let mut values = [0.0; N];
-        if let Some(bytes) = self.bytes(element) {
-            let size = self.component.size();
-            for (value, bytes) in values.iter_mut().take(self.components).zip(bytes.chunks(size)) {
-                *value = self.float(bytes);
-            }
-        }
-        values
+        self.read(element, |bytes| self.float(bytes))
     }
 
     /// The first `N` components of an element as unsigned integers.
     pub(super) fn integers<const N: usize>(&self, element: usize) -> [u32; N] {
-        let mut values = [0; N];
+        self.read(element, integer)
+    }
+
+    #[inline]
+    fn read<T: Copy + Default, const N: usize>(
+        &self,
+        element: usize,
+        of: impl Fn(&[u8]) -> T,
+    ) -> [T; N] {
+        let mut values = [T::default(); N];
         if let Some(bytes) = self.bytes(element) {
             let size = self.component.size();
             for (value, bytes) in values.iter_mut().take(self.components).zip(bytes.chunks(size)) {
-                *value = bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+                *value = of(bytes);
             }
         }
         values
@@ -151,6 +149,11 @@ impl<'a> Elements<'a> {
         };
         if self.normalized { (value / largest).max(-1.0) } else { value }
     }
+}
+
+/// An unsigned integer of as many bytes, the lowest first.
+fn integer(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte))
 }
 
 impl<'a> Strided<'a> {
@@ -205,8 +208,7 @@ impl<'a> Sparse<'a> {
         let values = Strided::open(file, values.buffer_view, offset, size, rows)?;
         let mut elements = Vec::with_capacity(rows);
         for row in 0..rows {
-            let bytes = indices.row(row, width).iter().rev();
-            let element = bytes.fold(0_u32, |word, &byte| word << 8 | u32::from(byte));
+            let element = integer(indices.row(row, width));
             if element as usize >= count {
                 return Err(format!("its sparse element {element} is beyond its {count} elements"));
             }

@@ -5,7 +5,7 @@ use json::extensions::scene::khr_lights_punctual::Light;
 use serde::Deserialize;
 
 use super::limits::Fallible;
-use super::objects::{Objects, members, not_gltf, read};
+use super::objects::{Objects, member, members, not_gltf, read};
 use super::{extensions, lenient};
 use crate::error::Notices;
 use crate::memory;
@@ -16,28 +16,6 @@ const BIN_CHUNK: &[u8] = b"BIN\0";
 
 /// What an object takes until something is made of it.
 const BYTES_OF_OBJECT: u64 = 16;
-
-/// Members of the outermost object that are read.
-const MEMBERS: [&str; 18] = [
-    "accessors",
-    "animations",
-    "asset",
-    "bufferViews",
-    "buffers",
-    "cameras",
-    "extensions",
-    "extensionsRequired",
-    "extensionsUsed",
-    "images",
-    "materials",
-    "meshes",
-    "nodes",
-    "samplers",
-    "scene",
-    "scenes",
-    "skins",
-    "textures",
-];
 
 /// What the JSON has. Only what is asked for is read, and validated where it is followed.
 pub(super) struct Document<'a> {
@@ -80,14 +58,14 @@ impl<'a> Document<'a> {
         }
         let values = lenient::check_indices(text, extensions::SUPPORTED)?;
         memory::check(values.saturating_mul(BYTES_OF_OBJECT))?;
-        let found = members(text, MEMBERS)?;
-        let of = |name: &str| MEMBERS.iter().position(|it| *it == name).and_then(|at| found[at]);
+        let found = members(text)?;
+        let of = |name: &str| found.get(name).copied();
         let generator = check_version(of("asset"))?;
         let names = |list| Objects::new(of(list), "extension");
         extensions::check(&names("extensionsUsed")?, &names("extensionsRequired")?, notices)?;
         let extensions = of("extensions").unwrap_or("{}");
-        let [lights] = members(extensions, ["KHR_lights_punctual"])?;
-        let [lights] = members(lights.unwrap_or("{}"), ["lights"])?;
+        let lights = member(extensions, "KHR_lights_punctual")?;
+        let lights = member(lights.unwrap_or("{}"), "lights")?;
         if of("animations").is_some() {
             notices.add("the file has animations: cameras alone follow theirs, in --frames; all else is at rest");
         }

@@ -276,8 +276,7 @@ impl<'a> Reader<'a> {
         let normal: Option<json::material::NormalTexture> =
             coat.get("clearcoatNormalTexture").and_then(parsed);
         material.clearcoat_normal_scale = self.finite(normal.as_ref().map_or(1.0, |map| map.scale));
-        self.texture(material, Slot::ClearcoatNormal, normal.as_ref())?;
-        Ok(())
+        self.texture(material, Slot::ClearcoatNormal, normal.as_ref())
     }
 
     /// The archived specular-glossiness model: a dielectric whose F0 is the specular colour, which

@@ -288,7 +288,7 @@ impl Reading<'_> {
             };
             let is_shared = |part: &&Part| {
                 let material = &self.materials.materials[part.material as usize];
-                sharing.wants(number) && !is_emitter(material)
+                sharing.wanted.contains(&number) && !is_emitter(material)
             };
             let shared: Vec<&Part> = parts.iter().filter(is_shared).collect();
             let extent = share::extent(&shared);
@@ -305,7 +305,7 @@ impl Reading<'_> {
                     _ => bake::append_instances(scene, part, &placement.instances, tally)?,
                 }
             }
-            if place == 0 && sharing.wants(number) {
+            if place == 0 && sharing.wanted.contains(&number) {
                 sharing.add(scene, &shared, placements, tally)?;
             }
             read = Some((weights, parts));

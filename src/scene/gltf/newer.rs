@@ -14,8 +14,7 @@ impl Reader<'_> {
     pub(super) fn anisotropy(&mut self, from: &Object, to: &mut Material) -> Fallible<()> {
         to.anisotropy = self.unit(number(from, "anisotropyStrength", 0.0));
         to.anisotropy_rotation = self.finite(number(from, "anisotropyRotation", 0.0));
-        self.texture(to, Slot::Anisotropy, texture(from, "anisotropyTexture"))?;
-        Ok(())
+        self.texture(to, Slot::Anisotropy, texture(from, "anisotropyTexture"))
     }
 
     /// `KHR_materials_sheen`.
@@ -23,8 +22,7 @@ impl Reader<'_> {
         to.sheen_color = self.unit_color(from, "sheenColorFactor", Vec3::ZERO);
         self.texture(to, Slot::SheenColor, texture(from, "sheenColorTexture"))?;
         to.sheen_roughness = self.unit(number(from, "sheenRoughnessFactor", 0.0));
-        self.texture(to, Slot::SheenRoughness, texture(from, "sheenRoughnessTexture"))?;
-        Ok(())
+        self.texture(to, Slot::SheenRoughness, texture(from, "sheenRoughnessTexture"))
     }
 
     /// `KHR_materials_diffuse_transmission`.
@@ -41,8 +39,7 @@ impl Reader<'_> {
             to,
             Slot::DiffuseTransmissionColor,
             texture(from, "diffuseTransmissionColorTexture"),
-        )?;
-        Ok(())
+        )
     }
 
     /// `KHR_materials_iridescence`.
@@ -53,8 +50,7 @@ impl Reader<'_> {
         let ends = [("iridescenceThicknessMinimum", 100.0), ("iridescenceThicknessMaximum", 400.0)];
         to.iridescence_thickness =
             ends.map(|(key, default)| self.within(number(from, key, default), 0.0, 1e6));
-        self.texture(to, Slot::IridescenceThickness, texture(from, "iridescenceThicknessTexture"))?;
-        Ok(())
+        self.texture(to, Slot::IridescenceThickness, texture(from, "iridescenceThicknessTexture"))
     }
 
     /// A colour of components clamped to `[0,1]`.

@@ -4,12 +4,13 @@
 //! is kept, four bytes each, and what nobody asks for is never made.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
 use gltf::json::Index;
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
@@ -84,14 +85,16 @@ pub(super) fn read<T: DeserializeOwned>(text: &str) -> serde_json::Result<T> {
     })
 }
 
-/// Members of an object by their names, the last of equal names; `None` where it has none or null.
-pub(super) fn members<'a, const N: usize>(
-    text: &'a str,
-    names: [&'static str; N],
-) -> Fallible<[Option<&'a str>; N]> {
+/// Members of an object by their names, the last of equal names, without those that are null.
+pub(super) fn members(text: &str) -> Fallible<BTreeMap<Cow<'_, str>, &str>> {
     serde_json::Deserializer::from_str(text)
-        .deserialize_map(Members { names })
+        .deserialize_map(Members)
         .map_err(|cause| not_gltf(&cause.to_string()))
+}
+
+/// One of the [`members`].
+pub(super) fn member<'a>(text: &'a str, name: &str) -> Fallible<Option<&'a str>> {
+    members(text).map(|found| found.get(name).copied())
 }
 
 struct Starts {
@@ -114,27 +117,21 @@ impl<'de> Visitor<'de> for Starts {
     }
 }
 
-struct Members<const N: usize> {
-    names: [&'static str; N],
-}
+struct Members;
 
-impl<'de, const N: usize> Visitor<'de> for Members<N> {
-    type Value = [Option<&'de str>; N];
+impl<'de> Visitor<'de> for Members {
+    type Value = BTreeMap<Cow<'de, str>, &'de str>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an object")
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Self::Value, A::Error> {
-        let mut found = [None; N];
-        while let Some(key) = object.next_key::<Cow<'de, str>>()? {
-            if let Some(place) = self.names.iter().position(|name| *name == key) {
-                let value = object.next_value::<&RawValue>()?.get();
-                found[place] = Some(value).filter(|value| *value != "null");
-            } else {
-                object.next_value::<IgnoredAny>()?;
-            }
+        let mut found = BTreeMap::new();
+        while let Some((key, value)) = object.next_entry::<_, &RawValue>()? {
+            found.insert(key, value.get());
         }
+        found.retain(|_, value| *value != "null");
         Ok(found)
     }
 }

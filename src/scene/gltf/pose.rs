@@ -335,10 +335,8 @@ pub(super) fn joint_transforms(
 ) -> Fallible<Vec<DAffine3>> {
     let skin: Skin = file.document.skins.get_as(index)?;
     let joints = &skin.joints;
-    let inverse_bind = match skin.inverse_bind_matrices {
-        Some(accessor) => Some(Elements::open(file, accessor, &[Type::Mat4])?),
-        None => None,
-    };
+    let open = |accessor| Elements::open(file, accessor, &[Type::Mat4]);
+    let inverse_bind = skin.inverse_bind_matrices.map(open).transpose()?;
     if let Some(matrices) = &inverse_bind
         && matrices.count < joints.len()
     {

@@ -149,10 +149,8 @@ impl<'a> Source<'a> {
             // All points are below the number of them, and there are as many positions.
             return Ok(draco.triangles().collect());
         }
-        let indices = match self.primitive.indices {
-            Some(accessor) => Some(Elements::open(self.file, accessor, &[Type::Scalar])?),
-            None => None,
-        };
+        let open = |accessor| Elements::open(self.file, accessor, &[Type::Scalar]);
+        let indices = self.primitive.indices.map(open).transpose()?;
         if indices.as_ref().is_some_and(|indices| !indices.is_unsigned()) {
             return Err("its indices are not unsigned integers".into());
         }

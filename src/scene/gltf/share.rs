@@ -35,7 +35,7 @@ const INSTANCE_BYTES: u64 = 800;
 /// The meshes that are shared, as far as they have been read.
 #[derive(Default)]
 pub(super) struct Sharing {
-    wanted: BTreeSet<u32>,
+    pub(super) wanted: BTreeSet<u32>,
     /// Triangles and materials of each mesh.
     meshes: Vec<(Vec<[u32; 3]>, Vec<u32>)>,
     instances: Vec<Instance>,
@@ -68,10 +68,6 @@ impl Sharing {
         }
         let pays = spared >= MIN_SPARED && spared >= all / 2;
         Ok(Self { wanted: if pays { wanted } else { BTreeSet::new() }, ..Self::default() })
-    }
-
-    pub(super) fn wants(&self, mesh: u32) -> bool {
-        self.wanted.contains(&mesh)
     }
 
     /// Takes in the parts of a mesh that are no lamps, and those of its places at which it can be shared.

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::document::Document;
 use super::lenient::whole;
 use super::limits::Fallible;
-use super::objects::{Objects, members};
+use super::objects::{Objects, member};
 use crate::error::Notices;
 
 const EXTENSION: &str = "KHR_materials_variants";
@@ -35,8 +35,8 @@ impl Look {
         name: Option<&str>,
         notices: &mut Notices,
     ) -> Fallible<Self> {
-        let [list] = members(document.extensions, [EXTENSION])?;
-        let [list] = members(list.unwrap_or("{}"), ["variants"])?;
+        let list = member(document.extensions, EXTENSION)?;
+        let list = member(list.unwrap_or("{}"), "variants")?;
         let variants: Objects<'_, Variant> = Objects::new(list, "variant")?;
         let names = || variants.indices().map(|index| variants.get(index).map(|it| it.name));
         let list = || {
