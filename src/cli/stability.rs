@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
     conclude(&reports)
 }
 
-fn choose(arguments: &StabilityArguments) -> Result<Vec<&'static Case>> {
+fn choose(arguments: &StabilityArguments) -> Result<Vec<Case>> {
     let with_gpu = arguments.device == Device::Gpu;
     // A whole name means that case or that group; part of one, all that contain it.
     let is_named = |case: &Case, name: &str| {
@@ -87,7 +87,7 @@ fn choose(arguments: &StabilityArguments) -> Result<Vec<&'static Case>> {
     let named = |case: &Case| {
         arguments.cases.is_empty() || arguments.cases.iter().any(|name| is_named(case, name))
     };
-    let chosen: Vec<&Case> = cases().filter(|case| case.runs(with_gpu) && named(case)).collect();
+    let chosen: Vec<Case> = cases().filter(|case| case.runs(with_gpu) && named(case)).collect();
     if chosen.is_empty() {
         return Err(Error::new(format!(
             "no case for this device is called {}; lightgrid stability --list names them",

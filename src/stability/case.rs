@@ -31,6 +31,7 @@ pub enum On {
 }
 
 /// A case: a scene or a computation with limits.
+#[derive(Debug, Clone, Copy)]
 pub struct Case {
     /// The group it belongs to.
     pub group: &'static str,
@@ -41,16 +42,10 @@ pub struct Case {
     pub(super) run: fn(&Setting) -> Result<Outcome>,
 }
 
-impl Case {
-    pub(super) const fn new(
-        group: &'static str,
-        name: &'static str,
-        on: On,
-        run: fn(&Setting) -> Result<Outcome>,
-    ) -> Self {
-        Self { group, name, on, run }
-    }
+/// A case of a group: its name, the devices it runs on, and what runs it.
+pub(super) type Entry = (&'static str, On, fn(&Setting) -> Result<Outcome>);
 
+impl Case {
     /// `group/name`.
     pub fn title(&self) -> String {
         format!("{}/{}", self.group, self.name)

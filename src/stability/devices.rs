@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::maps::sun;
 use super::outcome::Outcome;
 use super::reference::FloorReference;
@@ -19,17 +19,13 @@ use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
 use crate::scene::{Camera, Material, TextureSlot};
 
-const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("devices", name, on, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("f32-against-f64", On::Any, against_f64),
-    case("gpu-against-cpu", On::Gpu, |s| against_cpu(s, room(0.7, 1.0, Vec3::ZERO))),
-    case("gpu-against-cpu-glass", On::Gpu, |s| against_cpu(s, glasses())),
-    case("gpu-against-cpu-textured", On::Gpu, |s| against_cpu(s, textured())),
-    case("device-lost", On::Gpu, device_lost),
-    case("out-of-gpu-memory", On::Gpu, out_of_gpu_memory),
+pub(super) const CASES: &[Entry] = &[
+    ("f32-against-f64", On::Any, against_f64),
+    ("gpu-against-cpu", On::Gpu, |s| against_cpu(s, room(0.7, 1.0, Vec3::ZERO))),
+    ("gpu-against-cpu-glass", On::Gpu, |s| against_cpu(s, glasses())),
+    ("gpu-against-cpu-textured", On::Gpu, |s| against_cpu(s, textured())),
+    ("device-lost", On::Gpu, device_lost),
+    ("out-of-gpu-memory", On::Gpu, out_of_gpu_memory),
 ];
 
 /// Differences of pixels, relative to the pixel plus a thousandth of the picture's mean.
@@ -59,7 +55,7 @@ fn luminances(film: &Film) -> impl Iterator<Item = f64> {
 
 /// One sample per pixel, so that errors do not average out, and then many.
 fn against_f64(setting: &Setting) -> Result<Outcome> {
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
         let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
         let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
@@ -108,7 +104,7 @@ fn compare(
     let expected: Vec<f64> = luminances(&cpu).collect();
     let found = Deviations::of(luminances(&gpu), &expected);
     let ratio = mean(&gpu).luminance / mean(&cpu).luminance;
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(&gpu)
         // Paths that rounding moves to another triangle, texel or side of a lobe.
         .at_most("share of pixels off by 0.2 %", found.apart, 0.05)
@@ -138,7 +134,7 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
     let named = failure.contains(&gpu.facts().name) && !failure.contains('\n');
     let yes = |condition: bool| f64::from(u8::from(condition));
     let goes_on = session.samples() == 8 && mean(session.film()).luminance > 0.0;
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(session.film())
         .at_least("the loss is one sentence with the device's name", yes(named), 1.0)
         .at_least("what was rendered is kept", yes(kept), 1.0)
@@ -168,7 +164,7 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let clear = refusal.contains("MiB") && !refusal.contains('\n');
     let mut session = Session::on(&world, &environment, small, Some(&uploaded))?;
     session.advance(1, &AtomicBool::new(false))?;
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .at_least("refused with the numbers", f64::from(u8::from(clear)), 1.0)
         .at_least("a small picture afterwards", mean(session.film()).luminance, 1e-3)
         .remark(refusal))

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
 use super::scenes::{constant, learned, view};
 use crate::error::Result;
@@ -14,22 +14,18 @@ use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
-const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("film", name, on, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("1e7-samples-in-a-pixel", On::Cpu, |_| {
+pub(super) const CASES: &[Entry] = &[
+    ("1e7-samples-in-a-pixel", On::Cpu, |_| {
         Ok(sums(|random| 10.0_f32.powf(4.0 * random.next_f32() - 2.0)))
     }),
-    case("1e-8-beside-1e8", On::Cpu, |_| {
+    ("1e-8-beside-1e8", On::Cpu, |_| {
         Ok(sums(|random| if random.next_bits() & 1 == 0 { 1e-8 } else { 1e8 }))
     }),
-    case("1e7-samples-rendered", On::Any, |s| {
+    ("1e7-samples-rendered", On::Any, |s| {
         rendered(s, 0.1, if s.gpu.is_some() { s.count(100_000, 10_000_000) } else { 10_000_000 })
     }),
-    case("1e-8-rendered", On::Any, |s| rendered(s, 1e-8, 10_000)),
-    case("1e8-rendered", On::Any, |s| rendered(s, 1e8, 10_000)),
+    ("1e-8-rendered", On::Any, |s| rendered(s, 1e-8, 10_000)),
+    ("1e8-rendered", On::Any, |s| rendered(s, 1e8, 10_000)),
 ];
 
 const SAMPLES: u32 = 10_000_000;
@@ -53,7 +49,7 @@ fn sums(draw: impl Fn(&mut SplitMix) -> f32) -> Outcome {
     let luminance = pixel.mean_luminance();
     let variance = (exact_squares.sum() / count - luminance * luminance) / (count - 1.0);
     let relative = |found: f64, expected: f64| (found / expected - 1.0).abs();
-    Outcome::new()
+    Outcome::default()
         .at_most("mean of 1e7 samples against f64, relative", relative(pixel.mean()[0], mean), 1e-9)
         .at_most("the dark channel, relative", relative(pixel.mean()[1], f64::from(GREEN)), 1e-9)
         .at_most("variance, relative", relative(pixel.variance_of_mean(), variance), 1e-7)
@@ -92,7 +88,7 @@ fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
     // The map is interpolated in f32, which rounds once; a GPU keeps radiance to 2^-18 of itself,
     // and adds up to 64 samples in f32.
     let limit = if setting.gpu.is_some() { 2e-5 } else { 2e-7 };
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(film)
         .at_least("samples", f64::from(film.min_samples()), f64::from(samples))
         .at_most(format!("mean of {samples} samples, relative"), off, limit))

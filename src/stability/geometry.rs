@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
 use super::scenes::{
     Mean, SIGMAS, constant, deviation, difference, lambert, mean, render, room, sealed, sky, view,
@@ -15,20 +15,16 @@ use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
-const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("geometry", name, on, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("degenerate-and-duplicate", On::Any, degenerate),
-    case("slivers-1e6-to-1", On::Cpu, |s| Ok(slivers(s))),
-    case("coplanar-overlaps", On::Any, coplanar),
-    case("room-of-1e-4-m", On::Any, |s| scaled_room(s, 2.5e-5)),
-    case("room-of-1e6-m", On::Any, |s| scaled_room(s, 2.5e5)),
-    case("rays-along-shared-edges", On::Cpu, |s| Ok(leaks_on_axes(s))),
-    case("rays-anywhere", On::Cpu, |s| Ok(leaks_anywhere(s))),
-    case("paths-in-a-closed-room", On::Cpu, |s| Ok(bouncing_leaks(s))),
-    case("1e-3-m-room-on-1e4-m-ground", On::Any, small_beside_large),
+pub(super) const CASES: &[Entry] = &[
+    ("degenerate-and-duplicate", On::Any, degenerate),
+    ("slivers-1e6-to-1", On::Cpu, |s| Ok(slivers(s))),
+    ("coplanar-overlaps", On::Any, coplanar),
+    ("room-of-1e-4-m", On::Any, |s| scaled_room(s, 2.5e-5)),
+    ("room-of-1e6-m", On::Any, |s| scaled_room(s, 2.5e5)),
+    ("rays-along-shared-edges", On::Cpu, |s| Ok(leaks_on_axes(s))),
+    ("rays-anywhere", On::Cpu, |s| Ok(leaks_anywhere(s))),
+    ("paths-in-a-closed-room", On::Cpu, |s| Ok(bouncing_leaks(s))),
+    ("1e-3-m-room-on-1e4-m-ground", On::Any, small_beside_large),
 ];
 
 /// A closed box of `2 n^2` triangles a face in `[-size,size]^3`, vertices shared.
@@ -81,7 +77,7 @@ fn leaks(tree: &Bvh, count: u64, ray: impl Fn(&mut SplitMix) -> (Vec3, Vec3) + S
 /// Rays with one or two zero components, in planes of mesh vertices and along the edges between.
 fn leaks_on_axes(setting: &Setting) -> Outcome {
     let count = setting.count(10_000_000, 1_000_000_000);
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for n in [8_u32, 33] {
         let tree = cube(n, 1.0);
         let missed = leaks(&tree, count / 2, |random| {
@@ -109,7 +105,7 @@ fn leaks_on_axes(setting: &Setting) -> Outcome {
 
 fn leaks_anywhere(setting: &Setting) -> Outcome {
     let count = setting.count(1_000_000, 300_000_000);
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for size in [1e-4, 1.0, 1e6] {
         let tree = cube(17, size);
         let missed = leaks(&tree, count, |random| {
@@ -123,7 +119,7 @@ fn leaks_anywhere(setting: &Setting) -> Outcome {
 
 /// Paths whose rays start at the last hit, as the renderer's do, never leave.
 fn bouncing_leaks(setting: &Setting) -> Outcome {
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for size in [1e-4_f32, 1.0, 1e4] {
         let tree = cube(5, size);
         let missed: u32 = (0..64_u64)
@@ -192,7 +188,7 @@ fn slivers(setting: &Setting) -> Outcome {
     let count = setting.count(2_000_000, 200_000_000);
     let missed =
         leaks(&tree, count, |random| (random.next_in_cube() * 0.9, random.next_direction()));
-    Outcome::new().at_most(format!("leaks of {count} rays between slivers"), missed, 0.0)
+    Outcome::default().at_most(format!("leaks of {count} rays between slivers"), missed, 0.0)
 }
 
 /// Triangles without area, duplicates, and triangles with NaN or infinite corners change nothing.
@@ -224,7 +220,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
         .iter()
         .zip(b.pixels())
         .map(|(a, b)| (a.mean_luminance() - b.mean_luminance()).abs());
-    Ok(Outcome::new().sound(&b).at_most(
+    Ok(Outcome::default().sound(&b).at_most(
         "pixels' largest change by useless triangles",
         worst.fold(0.0, f64::max),
         0.0,
@@ -233,7 +229,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
 
 /// Two coplanar walls: either may be visible, and nothing else.
 fn coplanar(setting: &Setting) -> Result<Outcome> {
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for tilt in [0.0, 0.3] {
         let (a, b) = (Vec3::new(4.0, tilt, 0.0), Vec3::new(0.0, 0.2, -4.0));
         let corner = Vec3::new(-2.0, 0.0, 2.0);
@@ -265,9 +261,9 @@ fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
         Ok(mean(&render(setting, &builder.build(), &environment, view, 256)?))
     };
     let off = difference(of(1.0)?, of(scale)?);
-    let (world, camera) = sealed(0.8, scale, Vec3::ZERO);
+    let (world, camera) = sealed(scale);
     let film = render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?;
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(&film)
         .at_most("against the room of 4 m: standard errors off", off, SIGMAS)
         .at_most("light in the sealed room", mean(&film).luminance, 0.0))
@@ -296,7 +292,7 @@ fn small_beside_large(setting: &Setting) -> Result<Outcome> {
     // Near zero the origins of rays are moved by 1.5e-5 m: a hundredth of this room, so its light may be
     // off by as much (1e-2 below). The sealed one must be dark all the same.
     let (large, small) = (lit(1.0)?, lit(scale)?);
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(&dark)
         .at_most("light in the sealed millimetre room", mean(&dark).luminance, 0.0)
         .at_most("open one: standard errors off", deviation(small, large.luminance, 1e-2), SIGMAS))

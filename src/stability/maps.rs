@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
 use super::scenes::{SIGMAS, deviation, lambert, mean, render, view};
 use crate::environment::{Environment, EnvironmentOptions, sky};
@@ -19,29 +19,25 @@ use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
-const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("maps", name, On::Any, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("constant", |s| check(s, Image::filled(64, 32, [0.25, 0.5, 2.0]))),
-    case("black", black),
-    case("1x1", |s| check(s, Image::filled(1, 1, [1.0; 3]))),
-    case("2x1", |s| check(s, Image::from_fn(2, 1, |x, _| [1.0 - x as f32, x as f32, 9.0]))),
-    case("1xN", |s| check(s, noise(1, 97, |u| u))),
-    case("lit-at-the-seam", |s| check(s, lit(64, 32, &[(0, 9), (63, 20)]))),
-    case("lit-at-the-poles", |s| check(s, lit(64, 32, &[(17, 0), (40, 31)]))),
-    case("lit-at-the-corners", |s| check(s, lit(64, 32, &[(0, 0), (63, 31)]))),
-    case("sun-of-1e9", |s| check(s, sun(96, 48, 1e9))),
-    case("sun-of-1e-30", |s| check(s, scaled(sun(96, 48, 1e9), 1e-39))),
-    case("subnormal", subnormal),
-    case("half-overflow", half_overflow),
-    case("nan-inf-negative", nan_inf_negative),
-    case("extreme-contrast", |s| check(s, noise(128, 64, |u| 10.0_f32.powf(60.0 * u - 30.0)))),
-    case("16384-wide", |s| check(s, noise(16_384, 24, |u| u * u))),
-    case("8192-high", |s| check(s, noise(24, 8192, |u| u * u))),
-    case("16384x8192", |s| large(s, "day", 16_384, 8192)),
-    case("15000x7500", |s| large(s, "sunset", 15_000, 7500)),
+pub(super) const CASES: &[Entry] = &[
+    ("constant", On::Any, |s| check(s, Image::filled(64, 32, [0.25, 0.5, 2.0]))),
+    ("black", On::Any, black),
+    ("1x1", On::Any, |s| check(s, Image::filled(1, 1, [1.0; 3]))),
+    ("2x1", On::Any, |s| check(s, Image::from_fn(2, 1, |x, _| [1.0 - x as f32, x as f32, 9.0]))),
+    ("1xN", On::Any, |s| check(s, noise(1, 97, |u| u))),
+    ("lit-at-the-seam", On::Any, |s| check(s, lit(64, 32, &[(0, 9), (63, 20)]))),
+    ("lit-at-the-poles", On::Any, |s| check(s, lit(64, 32, &[(17, 0), (40, 31)]))),
+    ("lit-at-the-corners", On::Any, |s| check(s, lit(64, 32, &[(0, 0), (63, 31)]))),
+    ("sun-of-1e9", On::Any, |s| check(s, sun(96, 48, 1e9))),
+    ("sun-of-1e-30", On::Any, |s| check(s, scaled(sun(96, 48, 1e9), 1e-39))),
+    ("subnormal", On::Any, subnormal),
+    ("half-overflow", On::Any, half_overflow),
+    ("nan-inf-negative", On::Any, nan_inf_negative),
+    ("extreme-contrast", On::Any, |s| check(s, noise(128, 64, |u| 10.0_f32.powf(60.0 * u - 30.0)))),
+    ("16384-wide", On::Any, |s| check(s, noise(16_384, 24, |u| u * u))),
+    ("8192-high", On::Any, |s| check(s, noise(24, 8192, |u| u * u))),
+    ("16384x8192", On::Any, |s| large(s, "day", 16_384, 8192)),
+    ("15000x7500", On::Any, |s| large(s, "sunset", 15_000, 7500)),
 ];
 
 /// Random pixels: each channel is `f` of a uniform number.
@@ -83,7 +79,7 @@ fn black(setting: &Setting) -> Result<Outcome> {
         .filter(|tile| environment.sample_in_tile(*tile, random.next_words()).is_some())
         .count();
     let outcome =
-        Outcome::new().at_most("tiles of a black map that can be sampled", drawn as f64, 0.0);
+        Outcome::default().at_most("tiles of a black map that can be sampled", drawn as f64, 0.0);
     let film = floor(setting, &environment, 4)?;
     Ok(outcome.sound(&film).at_most("light from a black map", mean(&film).luminance, 0.0))
 }
@@ -96,7 +92,7 @@ fn subnormal(setting: &Setting) -> Result<Outcome> {
         // black is correct there.
         let environment = Environment::new(map, &EnvironmentOptions::default())?;
         let film = floor(setting, &environment, 16)?;
-        return Ok(Outcome::new().sound(&film).at_most(
+        return Ok(Outcome::default().sound(&film).at_most(
             "light from a map of at most 6e-39",
             mean(&film).luminance,
             2e-38,
@@ -128,7 +124,7 @@ fn repaired(setting: &Setting, mut map: Image, told: &[&str]) -> Result<Outcome>
     let notices: Notices = sanitise(&mut map);
     let said: Vec<&str> = notices.iter().collect();
     let silent = told.iter().filter(|part| !said.iter().any(|s| s.contains(**part))).count();
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .at_least("unrepaired map refused", f64::from(u8::from(refused)), 1.0)
         .at_most("repairs that are not told", silent as f64, 0.0)
         .and(check(setting, map)?))
@@ -151,7 +147,7 @@ fn check(setting: &Setting, map: Image) -> Result<Outcome> {
     let environment = Environment::new(map, &options)?;
     let (off, unreachable) = densities(&environment);
     let tiles = environment.tile_energies().iter().filter(|energy| **energy > 0.0).count();
-    let outcome = Outcome::new()
+    let outcome = Outcome::default()
         // f32 densities of up to 10,000 texels a tile, each rounded.
         .at_most(format!("densities of {tiles} tiles: integral off 1"), off, 2e-5)
         .at_most("lit points that no sample reaches", unreachable as f64, 0.0)

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
 use super::scenes::{
     FIRST_TEXTURE, Mean, SIGMAS, constant, deviation, glass, lambert, learned, mean, render, room,
@@ -18,21 +18,17 @@ use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::{Camera, Material, Medium, TextureSlot};
 
-const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("materials", name, On::Any, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("roughness-0-to-1e-4", nearly_smooth),
-    case("ior-1-and-3", indices),
-    case("white-room-1000-bounces", white_room),
-    case("normals-under-the-surface", buried_normals),
-    case("near-grazing", grazing),
-    case("nested-glass", nested),
-    case("optical-depths", optical_depths),
-    case("media-of-all-depths", media),
-    case("random-materials", random_materials),
-    case("overflow-is-counted", overflow),
+pub(super) const CASES: &[Entry] = &[
+    ("roughness-0-to-1e-4", On::Any, nearly_smooth),
+    ("ior-1-and-3", On::Any, indices),
+    ("white-room-1000-bounces", On::Any, white_room),
+    ("normals-under-the-surface", On::Any, buried_normals),
+    ("near-grazing", On::Any, grazing),
+    ("nested-glass", On::Any, nested),
+    ("optical-depths", On::Any, optical_depths),
+    ("media-of-all-depths", On::Any, media),
+    ("random-materials", On::Any, random_materials),
+    ("overflow-is-counted", On::Any, overflow),
 ];
 
 /// Maximum energy gain by tabulated albedos, as in the BSDF's own tests.
@@ -74,7 +70,7 @@ struct Furnaces {
 
 impl Furnaces {
     fn new() -> Self {
-        Self { outcome: Outcome::new(), brightest: 0.0, darkest: f64::INFINITY }
+        Self { outcome: Outcome::default(), brightest: 0.0, darkest: f64::INFINITY }
     }
 
     fn add(&mut self, film: &Film) {
@@ -134,7 +130,7 @@ fn white_room(setting: &Setting) -> Result<Outcome> {
     scene.materials.iter_mut().for_each(|m| m.base_color = Vec3::ONE.extend(1.0));
     let film = render(setting, &World::new(scene), &constant(1.0)?, view, setting.count(32, 512))?;
     let found = mean(&film);
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .sound(&film)
         .at_most("off 1: standard errors", deviation(found, 1.0, 1e-3), SIGMAS)
         .at_most("noise", found.error, 0.02))
@@ -291,7 +287,7 @@ fn overflow(setting: &Setting) -> Result<Outcome> {
     let odd = film.pixels().iter().filter(|p| !p.mean().iter().all(|c| c.is_finite())).count();
     let remarks = crate::output::remarks(film, &environment);
     let told = remarks.iter().filter(|s| s.contains("not finite")).count();
-    Ok(Outcome::new()
+    Ok(Outcome::default()
         .at_least("samples counted as not finite", film.invalid_samples() as f64, 1.0)
         .at_most("pixels that are NaN or infinite", odd as f64, 0.0)
         .at_least("sentences that say so", told as f64, 1.0))

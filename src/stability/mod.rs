@@ -17,6 +17,7 @@ mod reference;
 mod scenes;
 mod tables;
 
+use self::case::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
@@ -26,18 +27,20 @@ pub use self::case::{Case, On, Setting};
 pub use self::outcome::{Figure, Limit, Outcome, Verdict};
 
 /// All cases, group by group.
-pub fn cases() -> impl Iterator<Item = &'static Case> {
-    [
-        maps::CASES,
-        tables::CASES,
-        grid::CASES,
-        geometry::CASES,
-        materials::CASES,
-        film::CASES,
-        devices::CASES,
-    ]
-    .into_iter()
-    .flatten()
+pub fn cases() -> impl Iterator<Item = Case> {
+    let groups = [
+        ("maps", maps::CASES),
+        ("tables", tables::CASES),
+        ("grid", grid::CASES),
+        ("geometry", geometry::CASES),
+        ("materials", materials::CASES),
+        ("film", film::CASES),
+        ("devices", devices::CASES),
+    ];
+    let of_group = |(group, cases): (_, &'static [Entry])| {
+        cases.iter().map(move |&(name, on, run)| Case { group, name, on, run })
+    };
+    groups.into_iter().flat_map(of_group)
 }
 
 /// Result of a case that was run.
@@ -51,7 +54,7 @@ pub struct CaseReport {
 }
 
 /// Runs a case. An error or a panic in it becomes a failed verdict.
-pub fn run(case: &Case, setting: &Setting) -> CaseReport {
+pub fn run(case: Case, setting: &Setting) -> CaseReport {
     let start = Instant::now();
     let outcome = if case.on == On::Gpu && setting.gpu.is_none() {
         Outcome::skipped("needs --device gpu")

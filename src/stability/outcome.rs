@@ -81,11 +81,6 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// An outcome without figures.
-    pub(super) fn new() -> Self {
-        Self::default()
-    }
-
     /// A case that cannot be run here.
     pub(super) fn skipped(reason: impl Into<String>) -> Self {
         Self { remarks: vec![reason.into()], skipped: true, ..Self::default() }
@@ -197,16 +192,17 @@ mod tests {
 
     #[test]
     fn what_fails_decides_and_nothing_measured_is_no_pass() {
-        let sound = Outcome::new().at_most("a", 1.0, 10.0).at_least("b", 2.0, 1.0).info("c", 9e9);
+        let sound =
+            Outcome::default().at_most("a", 1.0, 10.0).at_least("b", 2.0, 1.0).info("c", 9e9);
         assert_eq!(sound.verdict(), Verdict::Passed);
         assert_eq!(sound.decisive().map(|f| f.what.as_str()), Some("a"));
         let failed = sound.clone().at_most("d", 1.0, 0.0).at_most("e", 1.0, 1.0);
         assert_eq!(failed.verdict(), Verdict::Failed);
         assert_eq!(failed.decisive().map(|f| f.what.as_str()), Some("d"));
         assert_eq!(sound.at_most("f", f64::NAN, f64::INFINITY).verdict(), Verdict::Failed);
-        assert_eq!(Outcome::new().verdict(), Verdict::Failed);
+        assert_eq!(Outcome::default().verdict(), Verdict::Failed);
         assert_eq!(Outcome::skipped("no GPU").verdict(), Verdict::Skipped);
-        let broken = Outcome::new().at_most("a", 0.0, 0.0).and(Outcome::broken("no room"));
+        let broken = Outcome::default().at_most("a", 0.0, 0.0).and(Outcome::broken("no room"));
         assert_eq!(broken.verdict(), Verdict::Failed);
     }
 }

@@ -70,11 +70,11 @@ pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (WorldBuilder, Came
 }
 
 /// The room without its window.
-pub(super) fn sealed(albedo: f32, scale: f32, center: Vec3) -> (World, Camera) {
-    let (builder, camera) = room(albedo, scale, center);
-    let low = center + Vec3::new(-2.0, 0.0, -1.5) * scale;
-    let high = center + Vec3::new(2.0, 2.5, 1.5) * scale;
-    (builder.faces(&lambert(albedo), low, high, [0]).build(), camera)
+pub(super) fn sealed(scale: f32) -> (World, Camera) {
+    let (builder, camera) = room(0.8, scale, Vec3::ZERO);
+    let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
+    let high = Vec3::new(2.0, 2.5, 1.5) * scale;
+    (builder.faces(&lambert(0.8), low, high, [0]).build(), camera)
 }
 
 /// A map of one radiance.

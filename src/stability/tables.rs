@@ -3,7 +3,7 @@
 //! The tile-local table has limits. Errors of the summed-area tables, which are kept for comparison, are reported
 //! without limits: they are known from the talk and from our own measurements.
 
-use super::case::{Case, On, Setting};
+use super::case::{Entry, On, Setting};
 use super::maps::{scaled, sun};
 use super::outcome::Outcome;
 use crate::environment::{SatReportRow, TableKind, sat_report, sky};
@@ -11,15 +11,11 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::sampler::SplitMix;
 
-const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case::new("tables", name, On::Cpu, run)
-}
-
-pub(super) const CASES: &[Case] = &[
-    case("tile-local", |s| everywhere(s, TableKind::TileLocal)),
-    case("u32", |s| everywhere(s, TableKind::U32)),
-    case("f32", |s| everywhere(s, TableKind::F32)),
-    case("f64", |s| everywhere(s, TableKind::F64)),
+pub(super) const CASES: &[Entry] = &[
+    ("tile-local", On::Cpu, |s| everywhere(s, TableKind::TileLocal)),
+    ("u32", On::Cpu, |s| everywhere(s, TableKind::U32)),
+    ("f32", On::Cpu, |s| everywhere(s, TableKind::F32)),
+    ("f64", On::Cpu, |s| everywhere(s, TableKind::F64)),
 ];
 
 fn maps(setting: &Setting) -> Result<[(&'static str, Image); 4]> {
@@ -51,7 +47,7 @@ fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
         ("density off what is sampled", |row| row.misreported_share),
         ("mean squared error of densities of mean 1", |row| row.mean_squared_error),
     ];
-    let mut outcome = Outcome::new();
+    let mut outcome = Outcome::default();
     for (what, of) in figures {
         let worst = rows.iter().max_by(|a, b| of(&a.1).total_cmp(&of(&b.1)));
         let Some((map, row)) = worst else { continue };
