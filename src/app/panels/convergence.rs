@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use egui::{Color32, Ui, Vec2b};
 use egui_plot::{Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
+use super::button::button;
 use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
 use crate::app::interface::Purpose;
@@ -28,9 +29,7 @@ pub(in crate::app) fn show(
         }
         ui.label(theme::quiet("Earlier runs are dim"));
         let hint = "A picture of this view without noise; the true error is plotted, too";
-        if ui.button("Reference…").on_hover_text(hint).clicked() {
-            commands.push(Command::Ask(Purpose::Reference));
-        }
+        button(ui, ("Reference…", hint), commands, Command::Ask(Purpose::Reference));
         if let Some((reference, is_of_view)) = reference {
             if ui.button("Remove").on_hover_text(&reference.name).clicked() {
                 commands.push(Command::ForgetReference);

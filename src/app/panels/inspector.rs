@@ -2,6 +2,7 @@
 
 use egui::{Color32, Grid, Rect, Response, RichText, Stroke, StrokeKind, Ui, Vec2};
 
+use super::button::button;
 use super::{color_bar, map_view, overlay};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
@@ -71,9 +72,8 @@ pub(in crate::app) fn show(
         ui.add_space(4.0);
         let hint =
             "All distributions as .csv, .json or .exr (one row a distribution, one column a tile)";
-        if ui.button("Export distributions…").on_hover_text(hint).clicked() {
-            commands.push(Command::Ask(Purpose::Distributions));
-        }
+        let command = Command::Ask(Purpose::Distributions);
+        button(ui, ("Export distributions…", hint), commands, command);
     }
 }
 

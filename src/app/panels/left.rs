@@ -8,6 +8,7 @@ use egui::{
 
 use glam::Vec3;
 
+use super::button::button;
 use super::{map_view, material};
 use crate::app::commands::Command;
 use crate::app::document::{Document, Viewpoint};
@@ -155,10 +156,9 @@ fn cameras(
             } else {
                 camera.name.clone()
             };
-            if ui.button(name).on_hover_text("Look through this camera of the scene").clicked() {
-                let distance = document.viewpoint.as_ref().map_or(3.0, |v| v.pivot_distance);
-                commands.push(Command::LookFrom(Viewpoint::of(camera, distance)));
-            }
+            let distance = document.viewpoint.as_ref().map_or(3.0, |v| v.pivot_distance);
+            let command = Command::LookFrom(Viewpoint::of(camera, distance));
+            button(ui, (&name, "Look through this camera of the scene"), commands, command);
         }
         for (i, viewpoint) in document.bookmarks.iter().enumerate() {
             let button = ui.button(viewpoint.name.clone());
@@ -170,12 +170,8 @@ fn cameras(
                 commands.push(Command::ForgetBookmark(i));
             }
         }
-        if ui.button("+ Keep").on_hover_text("Keep this viewpoint (B)").clicked() {
-            commands.push(Command::Bookmark);
-        }
-        if ui.button("Frame all").on_hover_text("Show the whole scene (F)").clicked() {
-            commands.push(Command::FrameAll);
-        }
+        button(ui, ("+ Keep", "Keep this viewpoint (B)"), commands, Command::Bookmark);
+        button(ui, ("Frame all", "Show the whole scene (F)"), commands, Command::FrameAll);
     });
     let Some(viewpoint) = &mut document.viewpoint else { return };
     let frame = scene.map_or_else(Frame::default, |scene| scene.world.scene.frame);

@@ -1,5 +1,6 @@
 //! What is drawn: free functions over plain data. No panel knows another one.
 
+mod button;
 mod color_bar;
 pub(super) mod convergence;
 pub(super) mod dock;

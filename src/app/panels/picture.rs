@@ -2,6 +2,7 @@
 
 use egui::{DragValue, Ui};
 
+use super::button::button;
 use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::theme;
@@ -34,13 +35,8 @@ pub(in crate::app) fn show(
     theme::section(ui, "STOP AT");
     stop(ui, document);
     theme::section(ui, "COMPARE");
-    if ui
-        .button("Keep this picture")
-        .on_hover_text("Keeps it for comparison with other pictures and later renders (K)")
-        .clicked()
-    {
-        commands.push(Command::KeepPicture);
-    }
+    let hint = "Keeps it for comparison with other pictures and later renders (K)";
+    button(ui, ("Keep this picture", hint), commands, Command::KeepPicture);
 }
 
 fn denoiser(ui: &mut Ui, document: &mut Document) {
@@ -142,14 +138,12 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
 }
 
 fn region(ui: &mut Ui, has_region: bool, commands: &mut Vec<Command>) {
-    let (text, hint) = if has_region {
+    let words = if has_region {
         ("Render the whole again", "Removes the region (X)")
     } else {
         ("Render a region…", "Then drag a rectangle over the picture (X)")
     };
-    if ui.button(text).on_hover_text(hint).clicked() {
-        commands.push(Command::ToggleRegion);
-    }
+    button(ui, words, commands, Command::ToggleRegion);
 }
 
 fn stop(ui: &mut Ui, document: &mut Document) {

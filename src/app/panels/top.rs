@@ -2,6 +2,7 @@
 
 use egui::{Align, Layout, Margin, Panel, Ui};
 
+use super::button::button;
 use crate::app::commands::Command;
 use crate::app::document::Document;
 use crate::app::interface::{Interface, Purpose, Tab};
@@ -70,12 +71,6 @@ pub(in crate::app) fn show(
 const TIGHT: f32 = 800.0;
 /// And where the little that is left must move together.
 const TIGHTEST: f32 = 480.0;
-
-fn button(ui: &mut Ui, (text, hint): (&str, &str), commands: &mut Vec<Command>, command: Command) {
-    if ui.button(text).on_hover_text(theme::keys(hint)).clicked() {
-        commands.push(command);
-    }
-}
 
 fn files(ui: &mut Ui, commands: &mut Vec<Command>) {
     let is_narrow = theme::is_narrow(ui);
