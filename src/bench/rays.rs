@@ -34,15 +34,6 @@ impl RayKind {
     /// In the order of measurement.
     pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Diffuse];
 
-    /// One word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Primary => "primary",
-            Self::Shadow => "shadow",
-            Self::Diffuse => "diffuse",
-        }
-    }
-
     fn question(self) -> Question {
         match self {
             Self::Shadow => Question::Transmittance,

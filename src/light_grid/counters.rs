@@ -180,20 +180,6 @@ impl Counters {
             + self.blocks.capacity() * size_of::<Box<[AtomicU64]>>()
             + self.blocks.iter().map(|b| b.len() * 8).sum::<usize>()
     }
-
-    /// A digest of every counter (FNV-1a over cells in slot order), for tests of repeatability.
-    pub fn digest(&self) -> u64 {
-        let mut digest = 0xcbf2_9ce4_8422_2325_u64;
-        let mut eat =
-            |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
-        for (slot, &cell) in self.cell_of_slot.iter().enumerate() {
-            eat(cell);
-            for word in &self.blocks[slot] {
-                parts(word.load(Ordering::Relaxed)).into_iter().for_each(&mut eat);
-            }
-        }
-        digest
-    }
 }
 
 /// Tries and fixed-point weight of a tile in one word, so that one addition counts both: neither

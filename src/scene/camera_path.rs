@@ -48,11 +48,6 @@ impl CameraPath {
         moves.then_some(Self { links })
     }
 
-    /// Seconds of the last key.
-    pub fn end(&self) -> f64 {
-        self.links.iter().map(Link::end).fold(0.0, f64::max)
-    }
-
     /// World from camera at a time in seconds; before the first key and after the last as there.
     pub fn at(&self, seconds: f64) -> DAffine3 {
         unmirrored(
@@ -205,7 +200,7 @@ mod tests {
         };
         let camera = Link::Fixed(DAffine3::from_translation(DVec3::new(0.0, 1.0, 4.0)));
         let path = CameraPath::new(vec![arm, camera]).expect("it moves");
-        assert_eq!(path.end(), 1.0);
+        assert_eq!(path.links.iter().map(Link::end).fold(0.0, f64::max), 1.0);
         for (seconds, angle) in [(0.0, 0.0), (0.5, 45.0_f64), (1.0, 90.0), (2.0, 90.0)] {
             let angle = angle.to_radians();
             let expected = DVec3::new(4.0 * angle.sin(), 1.0, 4.0 * angle.cos());

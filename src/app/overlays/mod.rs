@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::environment::Environment;
 use crate::light_grid::cells::SphericalGrid;
-use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
+use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::{Film, Pixel};
 
@@ -33,8 +33,6 @@ pub struct Sources<'a> {
     pub environment: &'a Environment,
     /// The distributions in use.
     pub grid: Option<&'a Arc<LightGrid>>,
-    /// What learning counted.
-    pub counters: Option<&'a LearningGrid>,
     /// Surfaces behind the film's pixels; only for overlays that need them.
     pub surfaces: Option<&'a SurfaceMap>,
     /// Facts of the cells of `grid`.

@@ -208,7 +208,6 @@ impl Memory {
             film: &session.film,
             environment: &snapshot.request.environment,
             grid: session.grid.as_ref(),
-            counters: snapshot.counters.as_deref(),
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
             cache: snapshot.cache.as_deref().ok(),

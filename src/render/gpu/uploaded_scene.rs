@@ -68,11 +68,6 @@ impl UploadedScene {
         }
         Ok(uploaded)
     }
-
-    /// The device it is on.
-    pub fn gpu(&self) -> &Gpu {
-        &self.gpu
-    }
 }
 
 /// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
