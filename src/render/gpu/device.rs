@@ -37,8 +37,9 @@ impl AdapterFacts {
         }
     }
 
-    /// Discrete before integrated before the rest, Vulkan, Metal and DX12 before OpenGL.
-    fn rank(&self) -> (u32, bool) {
+    /// Discrete before integrated before the rest; Vulkan and Metal before DX12, whose old compiler takes long for our
+    /// kernels, before OpenGL.
+    fn rank(&self) -> (u32, u32) {
         let kind = match self.kind {
             "discrete" => 0,
             "integrated" => 1,
@@ -46,7 +47,12 @@ impl AdapterFacts {
             "other" => 3,
             _ => 4,
         };
-        (kind, self.backend == "OpenGL")
+        let backend = match self.backend.as_str() {
+            "OpenGL" => 2,
+            "Dx12" => 1,
+            _ => 0,
+        };
+        (kind, backend)
     }
 }
 
@@ -113,11 +119,11 @@ pub(super) const MAX_STORAGE_BUFFERS: u32 = 28;
 const SURFACE_IS_BUSY: &str = "come idle before reconfiguring the Surface";
 
 impl Gpu {
-    /// Opens the best adapter, or the best of those whose name or backend contains `name` (in any
+    /// Opens the best adapter that can be opened, of all or of those whose name or backend contains `name` (in any
     /// case).
     ///
     /// # Errors
-    /// If there is none, or it cannot be opened.
+    /// If there is none, or none can be opened: why the best one cannot.
     pub fn open(name: Option<&str>) -> Result<Self> {
         Self::open_or_share(name, None)
     }
@@ -133,24 +139,33 @@ impl Gpu {
     /// # Errors
     /// As [`Self::open`].
     pub(crate) fn open_or_share(name: Option<&str>, shared: Option<&Self>) -> Result<Self> {
-        let mut others = Vec::new();
+        let (mut others, mut failure) = (Vec::new(), None);
         for backends in [PRIMARY, Backends::GL] {
             let instance = instance(backends, None);
             for (facts, adapter) in enumerate(&instance, None) {
-                if facts.is_called(name) {
-                    return match shared.filter(|gpu| gpu.facts == facts && gpu.check().is_ok()) {
-                        Some(shared) => Ok(shared.clone()),
-                        None => Self::connect(facts, instance, adapter),
-                    };
+                if !facts.is_called(name) {
+                    others.push(facts.title());
+                    continue;
                 }
-                others.push(facts.title());
+                if let Some(shared) = shared
+                    && shared.facts == facts
+                    && shared.check().is_ok()
+                {
+                    return Ok(shared.clone());
+                }
+                match Self::connect(facts, instance.clone(), adapter) {
+                    Ok(gpu) => return Ok(gpu),
+                    Err(error) => drop(failure.get_or_insert(error)),
+                }
             }
         }
-        Err(Error::new(match name {
-            Some(name) if !others.is_empty() => {
-                format!("no adapter is called {name}; there are {}", others.join(", "))
-            }
-            _ => NO_GPU.to_owned(),
+        Err(failure.unwrap_or_else(|| {
+            Error::new(match name {
+                Some(name) if !others.is_empty() => {
+                    format!("no adapter is called {name}; there are {}", others.join(", "))
+                }
+                _ => NO_GPU.to_owned(),
+            })
         }))
     }
 
