@@ -414,37 +414,43 @@ pub(super) mod tests {
             renderer.set_grid(grid.as_ref()).expect("uploaded");
             renderer
         };
-        let mut films = [true, false].map(|_| Film::new(view.width, view.height, false));
+        let film = || Film::new(view.width, view.height, false);
         let pass = Pass::to(3);
         let mut at_once = begin();
         let done = at_once.render(pass, None, &AtomicBool::new(false)).expect("rendered");
-        at_once.read_film(&mut films[0]).expect("read");
+        let mut film_at_once = film();
+        at_once.read_film(&mut film_at_once).expect("read");
         let all = 3 * u64::from(view.width * view.height);
         assert_eq!(done, Advance { samples: all, least: 3 });
-        let (mut renderer, mut calls, mut samples) = (begin(), 0, 0);
-        loop {
-            assert!(calls < 1000, "{samples} of the samples are there");
-            let cancel = Arc::new(AtomicBool::new(false));
-            let cut = Arc::clone(&cancel);
-            // One group of tiles at a time, or none: the pacer starts small.
-            renderer.settle().expect("it runs");
-            renderer.dispatcher.flights.forget_speed();
-            let cutter = std::thread::Builder::new().name("cutter".to_owned()).spawn(move || {
-                std::thread::sleep(std::time::Duration::from_millis(2));
-                cut.store(true, Ordering::Relaxed);
-            });
-            let done = renderer.render(pass, None, &cancel).expect("rendered");
-            cutter.expect("a thread").join().expect("it only sleeps");
-            calls += 1;
-            samples += done.samples;
-            if done.least == pass.target {
-                break;
+        let is_cut = || {
+            let (mut renderer, mut calls, mut samples) = (begin(), 0, 0);
+            loop {
+                assert!(calls < 1000, "{samples} of the samples are there");
+                let cancel = Arc::new(AtomicBool::new(false));
+                let cut = Arc::clone(&cancel);
+                // One group of tiles at a time, or none: the pacer starts small.
+                renderer.settle().expect("it runs");
+                renderer.dispatcher.flights.forget_speed();
+                let cutter =
+                    std::thread::Builder::new().name("cutter".to_owned()).spawn(move || {
+                        std::thread::sleep(std::time::Duration::from_millis(2));
+                        cut.store(true, Ordering::Relaxed);
+                    });
+                let done = renderer.render(pass, None, &cancel).expect("rendered");
+                cutter.expect("a thread").join().expect("it only sleeps");
+                calls += 1;
+                samples += done.samples;
+                if done.least == pass.target {
+                    break;
+                }
             }
-        }
-        renderer.read_film(&mut films[1]).expect("read");
-        // A real GPU is done before.
-        assert!(calls > 1 || !gpu.facts().is_software(), "it was cut");
-        assert_eq!(samples, all);
-        assert!(films[0] == films[1], "the same samples, each once");
+            let mut film = film();
+            renderer.read_film(&mut film).expect("read");
+            assert_eq!(samples, all);
+            assert!(film_at_once == film, "the same samples, each once");
+            calls > 1
+        };
+        // A real GPU is done before, and so is a software one while others keep the cutter from its core.
+        assert!((0..20).any(|_| is_cut()) || !gpu.facts().is_software(), "it was never cut");
     }
 }
