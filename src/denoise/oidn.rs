@@ -22,18 +22,18 @@ const NAMES: &[&str] = if cfg!(windows) {
 };
 
 /// Where the pip package `pyoidn` has the library, beside all that it needs, in a folder of packages.
-const PLACE_IN_PACKAGES: &str = "pyoidn/oidn/lib";
+const PLACE_IN_PACKAGES: &str = if cfg!(windows) { "pyoidn/oidn/bin" } else { "pyoidn/oidn/lib" };
 
-/// How to get it. Debian has no package of it (as of Debian 13). On Windows the pip package is not looked
-/// for: that loader does not look beside a library for what it needs.
-const HOW_TO_GET: &str = if cfg!(windows) {
-    "get it from openimagedenoise.org, and name the folder of OpenImageDenoise.dll in PATH"
+/// Where packages of lightgrid have it, seen from the program. On Linux its parts look for each other in `../lib`.
+const PLACE_BESIDE: &str = if cfg!(windows) { "." } else { "../lib/lightgrid/lib" };
+
+/// Where the loader looks for libraries.
+const LOADER_PATH: &str = if cfg!(windows) {
+    "PATH"
 } else if cfg!(target_os = "macos") {
-    "`pip install pyoidn` brings its library; or get that from openimagedenoise.org, and name its \
-     folder in DYLD_LIBRARY_PATH"
+    "DYLD_LIBRARY_PATH"
 } else {
-    "`pip install pyoidn` brings its library; or get that from openimagedenoise.org, and name its \
-     folder in LD_LIBRARY_PATH"
+    "LD_LIBRARY_PATH"
 };
 
 /// `OIDN_DEVICE_TYPE_CPU`: our pixels are in host memory.
@@ -63,20 +63,54 @@ type GetError = unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int;
 fn library() -> Result<&'static Library> {
     static LIBRARY: OnceLock<Option<Library>> = OnceLock::new();
     let library = LIBRARY.get_or_init(|| {
-        // Names without a folder: the loader looks in its own places.
-        let named = NAMES.iter().map(PathBuf::from);
-        first_that_loads(named.chain(installed_by_pip(python_prefixes())))
+        // Names without a folder: the loader looks in its own places. On Windows the current folder is one, which may
+        // be that of somebody's scene.
+        let named = match std::env::var_os("PATH") {
+            Some(path) if cfg!(windows) => std::env::split_paths(&path)
+                .filter(|folder| folder.is_absolute())
+                .flat_map(|folder| libraries_in(&folder))
+                .collect(),
+            _ => NAMES.iter().map(PathBuf::from).collect::<Vec<_>>(),
+        };
+        let program = std::env::current_exe().and_then(std::fs::canonicalize).ok();
+        let beside = program.and_then(|program| Some(program.parent()?.join(PLACE_BESIDE)));
+        let of_pip = if cfg!(windows) {
+            installed_by_pip_on_windows(|variable| std::env::var_os(variable).map(PathBuf::from))
+        } else {
+            installed_by_pip(python_prefixes()).collect()
+        };
+        let found = beside.into_iter().flat_map(|folder| libraries_in(&folder)).chain(of_pip);
+        first_that_loads(named.into_iter().chain(found))
     });
-    library
-        .as_ref()
-        .ok_or_else(|| Error::new(format!("Open Image Denoise is not installed: {HOW_TO_GET}")))
+    library.as_ref().ok_or_else(|| {
+        // Debian has no package of it (as of Debian 13).
+        Error::new(format!(
+            "Open Image Denoise is not installed: `pip install pyoidn` brings its library; or get that from \
+             openimagedenoise.org, and name its folder in {LOADER_PATH}"
+        ))
+    })
 }
 
 /// The first of these that the loader takes. What is no library, or lacks another that it needs, is passed
 /// over.
 fn first_that_loads(mut candidates: impl Iterator<Item = PathBuf>) -> Option<Library> {
     // SAFETY: the library's initialisers are those of Intel's product.
-    candidates.find_map(|path| unsafe { Library::new(path) }.ok())
+    candidates.find_map(|path| unsafe { loaded(&path) }.ok())
+}
+
+/// # Safety
+/// As for [`Library::new`].
+unsafe fn loaded(path: &Path) -> std::result::Result<Library, libloading::Error> {
+    #[cfg(windows)]
+    if path.is_absolute() {
+        use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library as OfWindows};
+        // What the library needs lies beside it, not beside this program.
+        // SAFETY: as the caller promises.
+        return unsafe { OfWindows::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }
+            .map(Library::from);
+    }
+    // SAFETY: as the caller promises.
+    unsafe { Library::new(path) }
 }
 
 /// The prefixes (`sys.prefix`) below which pip installs: of the environment in use, the user's, the system's.
@@ -110,6 +144,22 @@ fn installed_by_pip(prefixes: impl Iterator<Item = PathBuf>) -> impl Iterator<It
         .flat_map(|lib| newest_first(&lib, "python"))
         .flat_map(|python| ["site-packages", "dist-packages"].map(|packages| python.join(packages)))
         .flat_map(|packages| libraries_in(&packages.join(PLACE_IN_PACKAGES)))
+}
+
+/// The same on Windows, below the folders that these variables name: the environments in use, the user's packages, the
+/// user's Python and everybody's.
+fn installed_by_pip_on_windows(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
+    const FOLDERS: [(&str, &str); 3] =
+        [("APPDATA", "Python"), ("LOCALAPPDATA", "Programs/Python"), ("ProgramFiles", ".")];
+    let environments = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(&variable);
+    let installed = FOLDERS
+        .into_iter()
+        .filter_map(|(name, folder)| Some(variable(name)?.join(folder)))
+        .flat_map(|folder| newest_first(&folder, "Python"));
+    (environments.chain(installed).filter(|python| python.is_absolute()))
+        .flat_map(|python| ["site-packages", "Lib/site-packages"].map(|it| python.join(it)))
+        .flat_map(|packages| libraries_in(&packages.join(PLACE_IN_PACKAGES)))
+        .collect()
 }
 
 /// What is in a folder, called so and then a version or none, the newest first: `python3.12`, `python3.9`,
@@ -242,7 +292,7 @@ mod tests {
 
     /// A file where pyoidn's wheel has the library, below a prefix of Python; it is no library.
     fn put(prefix: &Path, packages: &str, name: &str) -> PathBuf {
-        let folder = prefix.join("lib").join(packages).join("pyoidn/oidn/lib");
+        let folder = prefix.join("lib").join(packages).join(PLACE_IN_PACKAGES);
         std::fs::create_dir_all(&folder).expect("a folder");
         let path = folder.join(name);
         std::fs::write(&path, "no library").expect("written");
@@ -267,6 +317,34 @@ mod tests {
         let mut expected = vec![newer, older, unversioned, of_system, of_debian];
         expected.dedup();
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn the_library_is_found_where_pip_has_it_on_windows() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let folder = |name: &str| temporary.path().join(name);
+        let put = |packages: &str| {
+            let folder = folder(packages).join(PLACE_IN_PACKAGES);
+            std::fs::create_dir_all(&folder).expect("a folder");
+            std::fs::write(folder.join(NAMES[0]), "no library").expect("written");
+            folder.join(NAMES[0])
+        };
+        let of_all = put("all/Python39/Lib/site-packages");
+        let newer = put("all/Python312/Lib/site-packages");
+        let of_user = put("roaming/Python/Python311/site-packages");
+        let environment = put("own/Lib/site-packages");
+        let found = installed_by_pip_on_windows(|variable| match variable {
+            "VIRTUAL_ENV" => Some(folder("own")),
+            "APPDATA" => Some(folder("roaming")),
+            "ProgramFiles" => Some(folder("all")),
+            _ => None,
+        });
+        let same = |found: &PathBuf, expected: &PathBuf| {
+            std::fs::canonicalize(found).ok() == std::fs::canonicalize(expected).ok()
+        };
+        let expected = [environment, of_user, newer, of_all];
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        assert!(found.iter().zip(&expected).all(|(a, b)| same(a, b)), "{found:?}");
     }
 
     #[test]
