@@ -1,5 +1,7 @@
 //! Large arrays that are read at random: fewer, larger memory pages.
 
+use crate::system::advise_huge_pages;
+
 /// The same values in memory that the system was asked to back by huge pages, where it can: random
 /// reads of some 10 MB and more otherwise spend much of their time on address translation.
 /// *Measured* on the BVH bench: see `docs/notebook/2026-11-method.md`.
@@ -26,23 +28,10 @@ pub(crate) fn zeros_on_huge_pages<T: bytemuck::Zeroable + Clone>(count: usize) -
 /// Two huge pages of x86-64.
 const WORTHWHILE_BYTES: usize = 4 << 20;
 
-/// Asks for huge pages behind memory that has not been touched yet.
-#[cfg(target_os = "linux")]
 fn advise<T>(memory: &mut Vec<T>) {
-    // As large as pages are anywhere.
-    const PAGE: usize = 1 << 16;
-    let start = (memory.as_mut_ptr() as usize).next_multiple_of(PAGE);
-    let end = memory.as_mut_ptr() as usize + memory.capacity() * size_of::<T>();
-    if end > start {
-        // SAFETY: the range lies within the allocation that `memory` owns, and the advice changes
-        // no contents. A refusal is harmless.
-        unsafe { libc::madvise(start as *mut libc::c_void, end - start, libc::MADV_HUGEPAGE) };
-    }
+    let start = memory.as_mut_ptr().addr();
+    advise_huge_pages(start..start + memory.capacity() * size_of::<T>());
 }
-
-/// Other systems choose page sizes themselves.
-#[cfg(not(target_os = "linux"))]
-fn advise<T>(_memory: &mut Vec<T>) {}
 
 #[cfg(test)]
 mod tests {

@@ -54,6 +54,7 @@ pub mod medium;
 mod memory;
 pub mod metrics;
 pub mod noise;
+mod out_of_memory;
 pub mod output;
 pub mod path;
 mod prefetch;
@@ -66,5 +67,6 @@ pub mod scene;
 pub mod sources;
 #[cfg(feature = "report")]
 pub mod stability;
+mod system;
 mod terminal;
 pub mod tone;

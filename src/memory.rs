@@ -1,11 +1,10 @@
 //! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
 
 use std::cell::Cell;
-#[cfg(target_os = "linux")]
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::error::Decoded;
+use crate::system;
 
 /// What is got without asking.
 const SMALL: u64 = 16 << 20;
@@ -50,7 +49,7 @@ pub(crate) fn check(needed: u64) -> Decoded<()> {
     if needed < SMALL {
         return Ok(());
     }
-    match available() {
+    match system::available_memory() {
         Some(left) if needed > left => {
             Err(format!("needs {} of memory, and {} are left", in_units(needed), in_units(left)))
         }
@@ -85,35 +84,6 @@ pub(crate) fn filled<T: Clone>(count: u64, value: T) -> Decoded<Vec<T>> {
     Ok(list)
 }
 
-/// Arenas of the GNU allocator: what works on pixels seldom asks it for memory.
-#[cfg(all(feature = "window", target_os = "linux", target_env = "gnu"))]
-const MAX_ARENAS: libc::c_int = 2;
-
-/// Has large arrays, such as films, given back to the system as soon as they are freed. The GNU allocator
-/// would take the first one as a sign to keep those of up to 32 MiB, two to an arena, which then is seldom
-/// empty; and there would be up to eight arenas for each core.
-#[cfg(feature = "window")]
-pub(crate) fn return_large_arrays() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: numbers for the allocator, which may be set at any time.
-    unsafe {
-        libc::mallopt(libc::M_MMAP_THRESHOLD, SMALL as libc::c_int);
-        libc::mallopt(libc::M_ARENA_MAX, MAX_ARENAS);
-    }
-}
-
-/// Gives back to the system what was freed between small things that are still in use: scenes, programs of
-/// a software device. Without it a window that shows one scene after another grows by as much as they
-/// leave in pieces.
-#[cfg(feature = "window")]
-pub(crate) fn return_freed() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: it may be called at any time, by any thread.
-    unsafe {
-        libc::malloc_trim(0);
-    }
-}
-
 /// Bytes in the largest unit that leaves a whole number of some size.
 fn in_units(bytes: u64) -> String {
     match bytes {
@@ -122,59 +92,6 @@ fn in_units(bytes: u64) -> String {
         10_000_000..10_000_000_000 => format!("{} MB", bytes / 1_000_000),
         _ => format!("{:.1} GB", bytes as f64 / 1e9),
     }
-}
-
-/// The least of what the machine, this process' address space and its control group have left; `None`
-/// where nothing is known.
-#[cfg(target_os = "linux")]
-fn available() -> Option<u64> {
-    let machine = kilobytes("/proc/meminfo", "MemAvailable:");
-    [machine, address_space(), control_group()].into_iter().flatten().min()
-}
-
-#[cfg(not(target_os = "linux"))]
-fn available() -> Option<u64> {
-    None
-}
-
-/// The number after a name in one of the kernel's lists, which count in 1024 bytes.
-#[cfg(target_os = "linux")]
-fn kilobytes(file: &str, name: &str) -> Option<u64> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
-}
-
-/// What `ulimit -v` leaves.
-#[cfg(target_os = "linux")]
-fn address_space() -> Option<u64> {
-    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
-    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
-    let limit: u64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(limit.saturating_sub(kilobytes("/proc/self/status", "VmSize:")?))
-}
-
-/// What the limits of a container, a batch system or a service leave: those of this process' own group and of all
-/// that it is in.
-#[cfg(target_os = "linux")]
-fn control_group() -> Option<u64> {
-    const ALL: &str = "/sys/fs/cgroup";
-    let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let own = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
-    let own = Path::new(ALL).join(own);
-    let groups = own.ancestors().take_while(|group| group.starts_with(ALL));
-    groups.filter_map(left_in_group).min()
-}
-
-/// What is left in one; pages of files that were read do not count, for they go first.
-#[cfg(target_os = "linux")]
-fn left_in_group(group: &Path) -> Option<u64> {
-    let read = |name| std::fs::read_to_string(group.join(name)).ok();
-    let number = |name| read(name)?.trim().parse::<u64>().ok();
-    let (limit, used) = (number("memory.max")?, number("memory.current")?);
-    let files = read("memory.stat")?;
-    let files = files.lines().find_map(|line| line.strip_prefix("inactive_file "))?;
-    Some(limit.saturating_sub(used.saturating_sub(files.parse().ok()?)))
 }
 
 #[cfg(test)]

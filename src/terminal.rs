@@ -4,10 +4,6 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
-#[cfg(unix)]
-use signal_hook::iterator::Signals;
-
 use crate::error::{Error, Result};
 
 /// Prints a line that was asked for, on stdout. If nobody reads it any more (`| head`) the process
@@ -46,63 +42,6 @@ pub(crate) fn leave_line() {
 /// Says what a person should know, though nothing failed.
 pub(crate) fn notice(text: impl Display) {
     tell(format_args!("notice: {text}"));
-}
-
-/// The signal of a terminal that is closed, unless it is ignored already: then somebody wants the process to
-/// outlive its terminal, as `nohup` does.
-pub(crate) fn hang_up() -> Option<i32> {
-    #[cfg(unix)]
-    {
-        // SAFETY: all zero is such a structure, and the call writes no more than that.
-        let ignored = unsafe {
-            let mut action: libc::sigaction = std::mem::zeroed();
-            libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut action) == 0
-                && action.sa_sigaction == libc::SIG_IGN
-        };
-        (!ignored).then_some(libc::SIGHUP)
-    }
-    #[cfg(not(unix))]
-    None
-}
-
-/// Has requests to end answered from now on, by number, in a thread of their own: Ctrl-C, the system's, a closed
-/// terminal.
-///
-/// # Errors
-/// If signals cannot be caught, or there is no thread.
-pub(crate) fn on_request_to_end(answer: impl FnMut(i32) + Send + 'static) -> io::Result<()> {
-    let mut signals = Signals::new([SIGINT, SIGTERM].into_iter().chain(hang_up()))?;
-    let wait = move || signals.forever().for_each(answer);
-    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map(drop)
-}
-
-/// Signals where no thread can wait for them: they are looked for sooner than anybody notices.
-#[cfg(not(unix))]
-struct Signals(std::sync::Arc<std::sync::atomic::AtomicUsize>);
-
-#[cfg(not(unix))]
-impl Signals {
-    const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(20);
-
-    fn new(signals: impl IntoIterator<Item = i32>) -> io::Result<Self> {
-        let caught = std::sync::Arc::default();
-        for signal in signals {
-            signal_hook::flag::register_usize(
-                signal,
-                std::sync::Arc::clone(&caught),
-                signal as usize,
-            )?;
-        }
-        Ok(Self(caught))
-    }
-
-    fn forever(&mut self) -> impl Iterator<Item = i32> {
-        std::iter::repeat_with(|| {
-            std::thread::sleep(Self::LOOK_EVERY);
-            self.0.swap(0, std::sync::atomic::Ordering::Relaxed) as i32
-        })
-        .filter(|signal| *signal != 0)
-    }
 }
 
 /// Names come from files, and some characters command a terminal or turn the text around: these become

@@ -18,6 +18,8 @@ use winit::event_loop::{
 };
 #[cfg(target_os = "linux")]
 use winit::platform::wayland::WindowAttributesExtWayland as _;
+#[cfg(windows)]
+use winit::platform::windows::IconExtWindows;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::application::{App, Start};
@@ -27,9 +29,8 @@ use super::settings_file::Settings;
 use super::threads::{Wake, Wakes};
 use super::{input_order, theme};
 use crate::error::{Error, Result};
-use crate::memory;
 use crate::render::gpu::Gpu;
-use crate::terminal::{hang_up, on_request_to_end};
+use crate::system::{exit_now, hang_up, on_request_to_end, return_large_arrays};
 
 /// What other threads ask the event loop for.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +73,7 @@ pub(crate) fn run(
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
 ) -> Result<Option<Error>> {
-    memory::return_large_arrays();
+    return_large_arrays();
     let no_display = |e: &dyn std::fmt::Display| {
         let text = e.to_string();
         // The toolkit puts the place in its own source before the cause.
@@ -124,7 +125,7 @@ fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
     let _ = on_request_to_end(move |signal| {
         // The shell of a terminal that is closed may say so twice.
         if asked.swap(true, Ordering::Relaxed) && hang_up() != Some(signal) {
-            signal_hook::low_level::exit(128 + signal);
+            exit_now(128 + signal);
         }
         let _ = proxy.send_event(Call::Repaint(Instant::now()));
     });
@@ -218,6 +219,10 @@ impl Runner {
         // By that a desktop finds its icon.
         #[cfg(target_os = "linux")]
         let attributes = attributes.with_name("lightgrid", "lightgrid");
+        // The icon of the program's file, of which packages have one.
+        #[cfg(windows)]
+        let attributes = attributes
+            .with_window_icon(<winit::window::Icon as IconExtWindows>::from_resource(1, None).ok());
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| cannot(&e))?);
         let wake = |call: Call| -> Wake {
             let proxy = self.proxy.clone();

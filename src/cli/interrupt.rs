@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::image::remove_unfinished;
-use crate::terminal::{hang_up, leave_line, notice, on_request_to_end, tell};
+use crate::system::{hang_up, on_request_to_end};
+use crate::terminal::{leave_line, notice, tell};
 
 /// What signals set.
 pub(super) struct Interrupt {

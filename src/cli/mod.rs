@@ -4,9 +4,12 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use crate::out_of_memory::Allocator;
+
 use crate::error::Result;
-use crate::image;
 use crate::memory;
+use crate::out_of_memory;
+use crate::system;
 use crate::terminal;
 
 #[cfg(not(all(feature = "window", feature = "report")))]
@@ -93,6 +96,8 @@ enum Command {
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
 pub fn main() -> ExitCode {
+    system::prepare_process();
+    out_of_memory::is_an_error();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(answer) => return say(&answer),
@@ -105,6 +110,7 @@ pub fn main() -> ExitCode {
                 std::thread::park();
             }
             terminal::tell(format_args!("lightgrid: {error}"));
+            system::show_error(&error.to_string());
             ExitCode::FAILURE
         }
     }
@@ -120,22 +126,6 @@ fn say(answer: &clap::Error) -> ExitCode {
         }
         _ => ExitCode::from(u8::try_from(answer.exit_code()).unwrap_or(1)),
     }
-}
-
-/// Whether memory that is refused must end the process: nobody asked for it, and there is nothing to go on with.
-/// For the binary's allocator; takes no memory.
-pub fn is_refusal_the_end() -> bool {
-    memory::is_refusal_the_end()
-}
-
-/// Whether this thread is the one to say why the process ends. For the binary; takes no memory.
-pub fn has_last_word() -> bool {
-    memory::has_last_word()
-}
-
-/// Removes what is being written, where the process ends without another word. For the binary; takes no memory.
-pub fn remove_unfinished() {
-    image::remove_unfinished();
 }
 
 fn run(arguments: Arguments) -> Result<()> {

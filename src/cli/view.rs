@@ -15,6 +15,7 @@ use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
 use crate::sources::is_scene;
+use crate::system;
 use crate::terminal::tell;
 
 /// Seconds of rendering when there is no display and nothing else says when to stop.
@@ -88,8 +89,11 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         small_maps: Settings::small_maps_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };
+    let is_double_clicked = system::leave_own_console();
     match window::run(start, notice.clone().into_iter().collect(), path) {
         Ok(closed_by) => closed_by.map_or(Ok(()), Err),
+        // Nobody would find that picture.
+        Err(error) if is_double_clicked => Err(error),
         Err(error) => {
             notice.iter().for_each(crate::terminal::notice);
             let picture = arguments.output.display();

@@ -1,21 +1,16 @@
 //! Writing a file so that it is either the old one or the whole new one.
 
-#[cfg(unix)]
-use std::ffi::CString;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::{self, BufWriter, Read, Write};
-#[cfg(unix)]
-use std::os::unix::{ffi::OsStrExt as _, fs as unix};
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
-#[cfg(unix)]
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::error::{Decoded, Error, Result};
 use crate::memory;
+use crate::system::FileName;
 
 /// Writes a file through a temporary one in the same folder, flushed to the disk and then renamed:
 /// whoever reads `path`, even after a crash, sees the old content or all of the new. A symbolic
@@ -41,7 +36,7 @@ pub fn write_beside_and_rename(
             buffered.flush()?;
             buffered.get_ref().sync_all()
         })
-        .and_then(|()| fs::rename(&temporary.path, &target));
+        .and_then(|()| rename(&temporary.path, &target));
     written.map_err(|error| Error::at(path, write_cause(&error)))?;
     // The rename itself reaches the disk with its folder; not every file system allows asking.
     if let Ok(folder) = File::open(folder_of(&target)) {
@@ -50,16 +45,41 @@ pub fn write_beside_and_rename(
     Ok(())
 }
 
+/// Renames a file over another one. Windows refuses that while a program has the other one open, as virus scanners
+/// have new files for moments: there it is tried again for a second.
+fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    const TRIES: u32 = 20;
+    const PAUSE: Duration = Duration::from_millis(50);
+    let mut outcome = fs::rename(from, to);
+    let mut tries = TRIES;
+    while tries > 0 && outcome.as_ref().is_err_and(is_in_use) {
+        std::thread::sleep(PAUSE);
+        outcome = fs::rename(from, to);
+        tries -= 1;
+    }
+    outcome.map_err(|error| match is_in_use(&error) {
+        true => io::Error::other("another program has it open"),
+        false => error,
+    })
+}
+
+/// Whether an error is what Windows says of a file that another program has open.
+fn is_in_use(error: &io::Error) -> bool {
+    const SHARING_VIOLATION: i32 = 32;
+    cfg!(windows)
+        && (error.kind() == io::ErrorKind::PermissionDenied
+            || error.raw_os_error() == Some(SHARING_VIOLATION))
+}
+
 /// Gives a file the owner and the group of the one that it takes the place of, as far as the system allows;
 /// the permissions that it is to get. Who may read the old content may read the new, and nobody else.
 fn kept_permissions(file: &File, existing: &Metadata) -> Permissions {
     let permissions = existing.permissions();
     #[cfg(unix)]
     {
-        use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+        use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, fchown};
         let group = Some(existing.gid());
-        let kept = unix::fchown(file, Some(existing.uid()), group)
-            .or_else(|_| unix::fchown(file, None, group));
+        let kept = fchown(file, Some(existing.uid()), group).or_else(|_| fchown(file, None, group));
         match kept {
             Ok(()) => permissions,
             Err(_) => Permissions::from_mode(permissions.mode() & !0o070),
@@ -130,6 +150,11 @@ fn checked_target(path: &Path) -> Result<PathBuf> {
     if is_stream(path) {
         return Err(Error::at(path, NOT_ORDINARY));
     }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if cfg!(windows) && names_device_or_stream(&name) {
+        let cause = "cannot be written: Windows takes its name for that of a device or a stream";
+        return Err(Error::at(path, cause.to_owned()));
+    }
     let target = followed(path);
     check_target(&target).map_err(|cause| Error::at(path, cause))?;
     Ok(target)
@@ -144,8 +169,9 @@ fn is_stream(path: &Path) -> bool {
         return true;
     }
     links(path).any(|link| {
-        fs::canonicalize(folder_of(&link))
-            .is_ok_and(|folder| folder.starts_with("/proc") && folder.ends_with("fd"))
+        fs::canonicalize(folder_of(&link)).is_ok_and(|folder| {
+            folder.starts_with("/dev/fd") || (folder.starts_with("/proc") && folder.ends_with("fd"))
+        })
     })
 }
 
@@ -191,6 +217,18 @@ fn check_target(target: &Path) -> std::result::Result<(), String> {
     }
 }
 
+/// Whether Windows takes a part of a path for a device, whatever its ending, or for a stream of a file
+/// ("Naming Files, Paths, and Namespaces" of Microsoft's documentation).
+pub(crate) fn names_device_or_stream(part: &str) -> bool {
+    const DEVICES: [&str; 7] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$", "CLOCK$"];
+    let stem = part.split('.').next().unwrap_or_default().trim_end().to_uppercase();
+    let port = stem.strip_prefix("COM").or_else(|| stem.strip_prefix("LPT"));
+    let mut digits = port.unwrap_or_default().chars();
+    let is_port =
+        digits.next().is_some_and(|c| c.is_ascii_digit() || "\u{b9}\u{b2}\u{b3}".contains(c));
+    part.contains(':') || DEVICES.contains(&&*stem) || (is_port && digits.next().is_none())
+}
+
 /// The folder a file lies in; `.` for a bare name.
 fn folder_of(target: &Path) -> &Path {
     target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
@@ -217,22 +255,16 @@ const TEMPORARY: [&str; 2] = [".lightgrid-", ".part"];
 
 /// Temporary files under way, as the system takes names: where they are removed in haste there may be no
 /// memory to make these.
-#[cfg(unix)]
-static UNDER_WAY: Mutex<Vec<CString>> = Mutex::new(Vec::new());
+static UNDER_WAY: Mutex<Vec<FileName>> = Mutex::new(Vec::new());
 
 /// Removes what is being written, for the process ends at once. Takes no memory and waits for nobody.
 pub(crate) fn remove_unfinished() {
-    #[cfg(unix)]
     if let Ok(names) = UNDER_WAY.try_lock() {
-        for name in names.iter() {
-            // SAFETY: it is a name. Nothing is left to do if it cannot be removed.
-            unsafe { libc::unlink(name.as_ptr()) };
-        }
+        names.iter().for_each(FileName::remove);
     }
 }
 
-#[cfg(unix)]
-fn under_way() -> MutexGuard<'static, Vec<CString>> {
+fn under_way() -> MutexGuard<'static, Vec<FileName>> {
     UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -246,8 +278,7 @@ impl Temporary {
     }
 
     fn create(&self) -> io::Result<File> {
-        #[cfg(unix)]
-        under_way().push(CString::new(self.path.as_os_str().as_bytes())?);
+        under_way().push(FileName::new(&self.path)?);
         OpenOptions::new().write(true).read(true).create_new(true).open(&self.path)
     }
 }
@@ -273,8 +304,9 @@ fn remove_leftovers(folder: &Path) {
 impl Drop for Temporary {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
-        #[cfg(unix)]
-        under_way().retain(|name| name.as_bytes() != self.path.as_os_str().as_bytes());
+        if let Ok(removed) = FileName::new(&self.path) {
+            under_way().retain(|name| *name != removed);
+        }
     }
 }
 
@@ -308,5 +340,55 @@ pub(crate) fn read_cause(error: &io::Error) -> String {
         io::ErrorKind::IsADirectory => "is a folder, not a file".into(),
         io::ErrorKind::UnexpectedEof => "is cut short".into(),
         _ => format!("cannot be read: {error}"),
+    }
+}
+
+#[cfg(all(test, windows))]
+mod tests {
+    use std::os::windows::fs::OpenOptionsExt as _;
+    use std::time::Instant;
+
+    use super::*;
+
+    /// A program that has a file open and lets others do no more than read it.
+    fn open_elsewhere(path: &Path) -> File {
+        const FILE_SHARE_READ: u32 = 1;
+        OpenOptions::new().read(true).share_mode(FILE_SHARE_READ).open(path).expect("opened")
+    }
+
+    fn write(path: &Path, text: &str) -> Result<()> {
+        write_beside_and_rename(path, |file| file.write_all(text.as_bytes()))
+    }
+
+    #[test]
+    fn a_file_that_another_program_has_open_is_tried_again_for_a_while() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        write(&path, "old").expect("written");
+        let scanner = open_elsewhere(&path);
+        let closing = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(300));
+            drop(scanner);
+        });
+        write(&path, "newer").expect("written once it was closed");
+        closing.join().expect("it was closed");
+        assert_eq!(fs::read_to_string(&path).expect("read"), "newer");
+
+        let viewer = open_elsewhere(&path);
+        let start = Instant::now();
+        let refusal = write(&path, "newest").unwrap_err().to_string();
+        assert!(start.elapsed() > Duration::from_millis(500));
+        assert!(refusal.contains("another program has it open"), "{refusal}");
+        assert_eq!(fs::read_to_string(&path).expect("read"), "newer");
+        drop(viewer);
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn names_of_devices_and_streams_are_refused_before_work() {
+        for name in ["nul.png", "CON.exr", "folder/a.png:b", "com1.png"] {
+            let refusal = check_writable(Path::new(name)).unwrap_err().to_string();
+            assert!(refusal.contains("device or a stream"), "{name}: {refusal}");
+        }
     }
 }

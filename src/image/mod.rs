@@ -24,7 +24,8 @@ pub(crate) use exr_write::exr_encoder_bytes;
 pub use exr_write::{ExrPicture, Layer, write_exr};
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub(crate) use file::{
-    extension, make_folder, name_of_process, open_file, read_cause, read_file, remove_unfinished,
+    extension, make_folder, name_of_process, names_device_or_stream, open_file, read_cause,
+    read_file, remove_unfinished,
 };
 pub(crate) use guard::catch_panic;
 pub(crate) use map::{IS_A_FILM, is_film, looks_like_film, looks_like_picture, looks_like_scene};

@@ -12,11 +12,12 @@ use imports::Imports;
 use source::{files, lines, plain, sources};
 
 /// Rooms by floor, from the ground up: each uses those below its own alone.
-const FLOORS: [&[&str]; 14] = [
+const FLOORS: [&[&str]; 15] = [
+    &["system"],
     &["alarm", "color", "error", "huge_pages", "math", "prefetch", "sampler"],
     &["bvh", "memory", "noise", "terminal"],
     &["image"],
-    &["environment", "scene", "tone"],
+    &["environment", "out_of_memory", "scene", "tone"],
     &["bsdf", "digest", "light_grid", "medium", "metrics", "sources"],
     &["radiance_cache"],
     &["path"],
@@ -30,7 +31,7 @@ const FLOORS: [&[&str]; 14] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 30] = [
+const CRATES: [(&str, &[&str]); 32] = [
     ("askama", &["report/pages"]),
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
@@ -47,6 +48,7 @@ const CRATES: [(&str, &[&str]); 30] = [
     ("gltf", &["scene/gltf"]),
     ("image", &["image"]),
     ("indicatif", &["cli/progress"]),
+    ("libc", &["system/unix"]),
     ("libloading", &["denoise/oidn"]),
     ("meshopt", &["scene/gltf/meshopt"]),
     ("nv_flip", &["metrics/flip"]),
@@ -57,8 +59,9 @@ const CRATES: [(&str, &[&str]); 30] = [
     ("pulp", &["denoise"]),
     ("rfd", &["app/desktop"]),
     ("ruzstd", &["image/ktx2"]),
-    ("signal_hook", &["app/window", "terminal"]),
+    ("signal_hook", &["system/unix"]),
     ("statrs", &["metrics"]),
+    ("windows_sys", &["system/windows"]),
     ("wgpu", &["app", "develop", "render/gpu"]),
     ("winit", &["app/desktop", "app/window"]),
 ];
@@ -127,41 +130,43 @@ const USE_THEIR_PARENT: &[&str] = &[
 ];
 
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
-const BUDGETS: [(&str, usize); 35] = [
+const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 49),
-    ("app", 11160),
-    ("bench", 594),
+    ("app", 11170),
+    ("bench", 589),
     ("bsdf", 1417),
-    ("bvh", 1358),
-    ("cli", 3440),
+    ("bvh", 1352),
+    ("cli", 3460),
     ("color", 25),
-    ("denoise", 1295),
+    ("denoise", 1330),
     ("develop", 468),
     ("digest", 91),
-    ("environment", 1940),
+    ("environment", 1923),
     ("error", 58),
     ("huge_pages", 30),
-    ("image", 2315),
-    ("lib", 46),
-    ("light_grid", 896),
-    ("main", 111),
+    ("image", 2350),
+    ("lib", 50),
+    ("light_grid", 883),
+    ("main", 13),
     ("math", 83),
     ("medium", 135),
-    ("memory", 119),
+    ("memory", 62),
     ("metrics", 193),
     ("noise", 80),
+    ("out_of_memory", 81),
     ("output", 610),
     ("path", 2800),
     ("prefetch", 15),
     ("radiance_cache", 348),
     ("render", 6430),
-    ("report", 3167),
+    ("report", 3156),
     ("sampler", 145),
-    ("scene", 10270),
+    ("scene", 10144),
     ("shaders", 6060),
     ("sources", 119),
-    ("stability", 1930),
-    ("terminal", 91),
+    ("stability", 1891),
+    ("system", 325),
+    ("terminal", 48),
     ("tone", 188),
 ];
 

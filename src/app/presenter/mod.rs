@@ -115,7 +115,7 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
         last = Some((kept, end));
         wake();
         if returned.elapsed() > RETURN {
-            crate::memory::return_freed();
+            crate::system::return_freed();
             returned = Instant::now();
         }
     }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::system::thread_cpu_time;
+
 /// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
 /// is much better than the last, and most after [`MAX_REST_AFTER`]. With all of the cores it then takes a
 /// seventeenth of the machine.
@@ -24,32 +26,18 @@ pub(super) struct Work(Option<Duration>);
 
 impl Work {
     pub(super) fn start() -> Self {
-        Self(time_at_work())
+        Self(thread_cpu_time())
     }
 
     /// What it took, of so much by the clock.
     pub(super) fn time(&self, elapsed: Duration) -> Duration {
-        let worked = time_at_work().zip(self.0).map(|(now, start)| now.saturating_sub(start));
+        let worked = thread_cpu_time().zip(self.0).map(|(now, start)| now.saturating_sub(start));
         worked.map_or(elapsed, |worked| between(worked.min(elapsed), elapsed))
     }
 }
 
 fn between(worked: Duration, elapsed: Duration) -> Duration {
     Duration::from_secs_f64((worked.as_secs_f64() * elapsed.as_secs_f64()).sqrt())
-}
-
-/// Of this thread, where the system tells.
-fn time_at_work() -> Option<Duration> {
-    #[cfg(target_os = "linux")]
-    {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: plain system call, which writes into what it is given.
-        let outcome = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-        let seconds = u64::try_from(time.tv_sec).ok().filter(|_| outcome == 0)?;
-        Some(Duration::new(seconds, u32::try_from(time.tv_nsec).ok()?))
-    }
-    #[cfg(not(target_os = "linux"))]
-    None
 }
 
 #[cfg(test)]
@@ -63,11 +51,5 @@ mod tests {
         assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
         assert_eq!(rest_after(seconds(0.5), 0.0), seconds(1.5));
         assert_eq!(rest_after(seconds(0.5), 1e9), seconds(8.0));
-        // Who sleeps is not at work.
-        if let Some(before) = time_at_work() {
-            std::thread::sleep(Duration::from_millis(200));
-            let worked = time_at_work().expect("it told before") - before;
-            assert!(worked < Duration::from_millis(200), "{worked:?}");
-        }
     }
 }

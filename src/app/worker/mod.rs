@@ -39,6 +39,7 @@ use super::threads::{LatestThread, Wake, lock};
 use crate::alarm::Alarm;
 use crate::error::{Error, Result};
 use crate::render::gpu::{Gpu, RayChoice};
+use crate::system::lower_thread_priority;
 
 /// The handle of the render thread; it ends when dropped.
 pub(crate) struct Worker {
@@ -56,7 +57,8 @@ impl Worker {
     pub(crate) fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .thread_name(|i| format!("render {i}"))
-            .start_handler(|_| lower_priority())
+            // The window comes first: threads that render give way to it.
+            .start_handler(|_| lower_thread_priority())
             .build()
             .map_err(|e| Error::new(format!("the render threads cannot be started: {e}")))?;
         let pool = Arc::new(pool);
@@ -141,15 +143,6 @@ impl Drop for Worker {
             true => ControlFlow::Continue(None),
             false => ControlFlow::Break(()),
         });
-    }
-}
-
-/// The window comes first: render threads give way to it.
-fn lower_priority() {
-    #[cfg(target_os = "linux")]
-    // SAFETY: plain system call; 0 names the calling thread, and failing is harmless.
-    unsafe {
-        libc::setpriority(libc::PRIO_PROCESS, 0, 5);
     }
 }
 

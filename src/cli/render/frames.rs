@@ -15,6 +15,7 @@ use crate::image::{extension, name_of_process, write_beside_and_rename};
 use crate::path::{World, framing};
 use crate::scene::Camera;
 use crate::scene::camera_path::CameraPath;
+use crate::system::set_apart;
 
 /// Which pictures are asked for, and where the camera is in each.
 pub(super) struct Frames<'a> {
@@ -261,8 +262,7 @@ impl Reel {
             .current_dir(&self.folder)
             .stdin(Stdio::null());
         // Ctrl-C ends the rendering, not the video of what there is.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        set_apart(&mut command);
         let output = command.output();
         let output =
             output.map_err(|e| Error::at(path, format!("ffmpeg cannot be started: {e}")))?;

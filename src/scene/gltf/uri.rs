@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use super::limits::Fallible;
-use crate::image::{read_cause, read_file};
+use crate::image::{names_device_or_stream, read_cause, read_file};
 
 /// How a URI begins that is data itself.
 const DATA: &str = "data:";
@@ -140,18 +140,6 @@ fn is_below(path: &Path, folder: &Path) -> bool {
 fn names_host_or_drive(name: &str) -> bool {
     let is_drive = matches!(name.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
     is_drive || (name.starts_with(SLASHES) && name[1..].starts_with(SLASHES))
-}
-
-/// Whether Windows takes a part of a path for a device, whatever its ending, or for a stream of a file
-/// ("Naming Files, Paths, and Namespaces" of Microsoft's documentation).
-fn names_device_or_stream(part: &str) -> bool {
-    const DEVICES: [&str; 7] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$", "CLOCK$"];
-    let stem = part.split('.').next().unwrap_or_default().trim_end().to_uppercase();
-    let port = stem.strip_prefix("COM").or_else(|| stem.strip_prefix("LPT"));
-    let mut digits = port.unwrap_or_default().chars();
-    let is_port =
-        digits.next().is_some_and(|c| c.is_ascii_digit() || "\u{b9}\u{b2}\u{b3}".contains(c));
-    part.contains(':') || DEVICES.contains(&&*stem) || (is_port && digits.next().is_none())
 }
 
 /// What there is in the folder under a name that differs in the case of its letters alone.
