@@ -82,13 +82,13 @@ impl Default for Settings {
 impl Settings {
     /// Where they are kept: under the user's folder for configuration; `None` if there is none.
     pub fn default_path() -> Option<PathBuf> {
-        Some(user_folder("XDG_CONFIG_HOME", ".config")?.join("window.json"))
+        Some(user_folder(CONFIG)?.join("window.json"))
     }
 
     /// Where kept pictures are: beside a settings file that was named, else under the user's folder for
     /// data; `None` if there is none.
     pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
-        let usual = || Some(user_folder("XDG_DATA_HOME", ".local/share")?.join("pictures"));
+        let usual = || Some(user_folder(DATA)?.join("pictures"));
         let beside = |file: &Path| with_suffix(file, ".pictures");
         file.map(beside).or_else(usual)
     }
@@ -96,7 +96,7 @@ impl Settings {
     /// Where small pictures of maps are: beside a settings file that was named, else under the user's folder for
     /// what can be made again; `None` if there is none.
     pub fn small_maps_folder(file: Option<&Path>) -> Option<PathBuf> {
-        let usual = || Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("maps"));
+        let usual = || Some(user_folder(CACHE)?.join("maps"));
         file.map(|file| with_suffix(file, ".maps")).or_else(usual)
     }
 
@@ -308,18 +308,23 @@ fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
     path.into()
 }
 
-/// lightgrid's folder in that of a variable, or in one of the user's home (systems that are not Unix have
-/// one for everything).
-fn user_folder(variable: &str, of_home: &str) -> Option<PathBuf> {
-    let folder = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
+/// Kinds of the user's folders: the variable that names one and the one below the home folder where it is not set, that
+/// on macOS, and the variable on Windows, where companies copy `APPDATA` over the network at each log-in.
+const CONFIG: [&str; 4] = ["XDG_CONFIG_HOME", ".config", "Library/Application Support", "APPDATA"];
+const DATA: [&str; 4] =
+    ["XDG_DATA_HOME", ".local/share", "Library/Application Support", "LOCALAPPDATA"];
+const CACHE: [&str; 4] = ["XDG_CACHE_HOME", ".cache", "Library/Caches", "LOCALAPPDATA"];
+
+/// lightgrid's folder in one of the user's; `None` if there is none.
+fn user_folder([variable, folder, on_macos, on_windows]: [&str; 4]) -> Option<PathBuf> {
+    let named = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
+    let of_home = |folder: &str| named("HOME").map(|home| home.join(folder));
     let folder = if cfg!(windows) {
-        folder("APPDATA")
+        named(on_windows)
     } else if cfg!(target_os = "macos") {
-        folder("HOME").map(|home| home.join("Library/Application Support"))
+        of_home(on_macos)
     } else {
-        folder(variable)
-            .filter(|path| path.is_absolute())
-            .or_else(|| folder("HOME").map(|home| home.join(of_home)))
+        named(variable).filter(|path| path.is_absolute()).or_else(|| of_home(folder))
     };
     Some(folder?.join("lightgrid"))
 }
@@ -433,7 +438,7 @@ mod tests {
         let second = lists(&["/b.hdr", "/a.hdr"], &[("open", "hill")]);
         kept.take_lists(&before, &first);
         kept.take_lists(&before, &second);
-        assert_eq!(kept.recent_maps, ["/b.hdr", "/c.hdr", "/a.hdr"]);
+        assert_eq!(kept.recent_maps, ["/b.hdr", "/c.hdr", "/a.hdr"].map(lasting));
         let names = |scene: &str| kept.viewpoints_of(scene).into_iter().map(|view| view.name);
         assert!(names("office").eq(["desk"]) && names("open").eq(["hill"]));
         assert_eq!(names("crack").len(), 0, "the second has forgotten it");
