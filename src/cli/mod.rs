@@ -1,6 +1,7 @@
 //! What a person types, and what they read back.
 
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
@@ -9,6 +10,7 @@ pub use crate::out_of_memory::Allocator;
 use crate::error::Result;
 use crate::memory;
 use crate::out_of_memory;
+use crate::render::SAMPLES_VERSION;
 use crate::system;
 use crate::terminal;
 
@@ -41,12 +43,31 @@ mod view;
 #[cfg(not(all(feature = "window", feature = "report")))]
 use absent::*;
 
+/// What a report of a fault should name: version, commit, features, and the version of the samples.
+static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
+    let features = [
+        ("window", cfg!(feature = "window")),
+        ("gpu", cfg!(feature = "gpu")),
+        ("report", cfg!(feature = "report")),
+        ("flip", cfg!(feature = "flip")),
+        ("meshopt", cfg!(feature = "meshopt")),
+    ];
+    let features = features.iter().filter(|(_, has)| *has).map(|(name, _)| *name);
+    format!(
+        "{}\ncommit: {}\nfeatures: {}\nsamples: version {SAMPLES_VERSION}",
+        env!("CARGO_PKG_VERSION"),
+        option_env!("LIGHTGRID_COMMIT").unwrap_or("not known"),
+        features.collect::<Vec<_>>().join(" "),
+    )
+});
+
 /// A progressive path tracer for scenes lit by an HDR environment map. It learns which tiles of the
 /// map each part of the picture can see, and samples only those.
 #[derive(Debug, Parser)]
 #[command(
     name = "lightgrid",
     version,
+    long_version = LONG_VERSION.as_str(),
     after_help = "\
 Without a command the window opens with the built-in living room.
 

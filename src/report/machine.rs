@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::plan::Device;
 use crate::digest::Digest;
 use crate::error::Result;
+use crate::render::SAMPLES_VERSION;
 use crate::render::gpu::Gpu;
 
 /// The machine, in words.
@@ -32,7 +33,10 @@ impl Machine {
             processor: processor(),
             threads: rayon::current_num_threads(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-            build: format!("lightgrid {}, {optimised}", env!("CARGO_PKG_VERSION")),
+            build: format!(
+                "lightgrid {}, {optimised}, samples of version {SAMPLES_VERSION}",
+                env!("CARGO_PKG_VERSION")
+            ),
             load: fs::read_to_string("/proc/loadavg")
                 .ok()
                 .and_then(|text| text.split_whitespace().next()?.parse().ok()),
@@ -48,12 +52,24 @@ impl Machine {
     }
 }
 
+/// The processor's name, as it says itself.
 fn processor() -> String {
-    let known = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|line| line.starts_with("model name"))?;
-        Some(line.split_once(':')?.1.trim().to_owned())
-    });
-    known.unwrap_or_else(|| format!("unnamed {} processor", std::env::consts::ARCH))
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::__cpuid;
+        /// The first of three leaves that hold the name, and where the last leaf is told ("Processor Brand String" of
+        /// Intel's and AMD's manuals).
+        const NAME: u32 = 0x8000_0002;
+        const LAST: u32 = 0x8000_0000;
+        if __cpuid(LAST).eax >= NAME + 2 {
+            let leaves = (NAME..NAME + 3).map(__cpuid);
+            let words = leaves.flat_map(|leaf| [leaf.eax, leaf.ebx, leaf.ecx, leaf.edx]);
+            let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
+            let name = String::from_utf8_lossy(&bytes);
+            return name.trim_end_matches('\0').trim().to_owned();
+        }
+    }
+    format!("unnamed {} processor", std::env::consts::ARCH)
 }
 
 /// A device ready to be measured on.
