@@ -477,10 +477,27 @@ mod tests {
         let info = validator
             .validate(&module)
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
-        // The step after validation, in which naga has been seen to fail.
+        // The step after validation, in which naga has been seen to fail: for Vulkan, Metal and DX12.
         let options = naga::back::spv::Options::default();
         naga::back::spv::write_vec(&module, &info, &options, None)
             .unwrap_or_else(|e| panic!("{names:?}: {e}"));
+        let options = naga::back::msl::Options {
+            lang_version: (2, 4),
+            ..naga::back::msl::Options::default()
+        };
+        naga::back::msl::write_string(&module, &info, &options, &Default::default())
+            .unwrap_or_else(|e| panic!("{names:?} for Metal: {e}"));
+        use naga::back::hlsl;
+        let asks_hardware = program.source.contains("rayQueryInitialize");
+        let shader_model = match asks_hardware {
+            true => hlsl::ShaderModel::V6_5,
+            // That of the compiler which every Windows has.
+            false => hlsl::ShaderModel::V5_1,
+        };
+        let options = hlsl::Options { shader_model, ..hlsl::Options::default() };
+        hlsl::Writer::new(&mut String::new(), &options, &Default::default())
+            .write(&module, &info, None)
+            .unwrap_or_else(|e| panic!("{names:?} for DX12: {e}"));
         let entries: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(entries, [kernel.name()]);
         let is_buffer = |binding: &&Binding| matches!(binding, Binding::Buffer { .. });
