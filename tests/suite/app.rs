@@ -315,6 +315,7 @@ fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
 }
 
 #[test]
+#[cfg_attr(windows, ignore = "Windows always has a display")]
 fn without_a_display_the_picture_is_rendered_into_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     // The second is lit by the first: a map in the place of a scene, as file managers hand it over.

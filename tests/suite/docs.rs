@@ -218,8 +218,9 @@ fn every_command_parses() {
 #[test]
 fn every_option_that_is_spoken_of_exists() {
     let known: Vec<String> = options().into_values().flatten().collect();
-    // Those of srun, sbatch, GNU parallel, and cargo.
+    // Those of srun, sbatch, GNU parallel, cargo, and of no command.
     let others = [
+        "--version",
         "--requeue",
         "--retries",
         "--transferfile",

@@ -71,7 +71,7 @@ fn uris_stay_below_the_scenes_folder_unless_they_may_leave_it() {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("sub/deep")).unwrap();
     fs::copy(bench.path("scene.bin"), bench.path("sub/deep/own.bin")).unwrap();
-    let absolute = bench.path("scene.bin").display().to_string();
+    let absolute = bench.path("scene.bin").display().to_string().replace('\\', "/");
     for (uri, reason) in [
         ("deep/own.bin", ""),
         ("./deep/../deep/own.bin", ""),
@@ -250,7 +250,7 @@ fn every_output_is_tried_every_failure_told_and_the_picture_rescued() {
     let line = SMALL.replace("--spp 1", "--seconds 8");
     let child = bench
         .command(&format!("{line} -o gone/a.exr -o b.png --json gone/c.json --distributions d.csv"))
-        .env("TMPDIR", bench.path("tmp"))
+        .envs(["TMPDIR", "TMP"].map(|name| (name, bench.path("tmp"))))
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
