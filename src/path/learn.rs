@@ -42,11 +42,6 @@ impl PathTracer<'_> {
     }
 }
 
-/// What the cosine is to a surface: the phase function over that of even scattering.
-fn phase_weight(phase: f32) -> f32 {
-    4.0 * std::f32::consts::PI * phase
-}
-
 impl Path<'_> {
     /// Where this vertex counts, if it does.
     fn counts(&self) -> Option<&LearningGrid> {
@@ -79,7 +74,8 @@ impl Path<'_> {
         let Some(learning) = self.tracer.counts else { return 0.0 };
         let share = match &vertex.scatterer {
             Scatterer::Surface(surface) => surface.shading_frame.z.dot(direction).abs(),
-            Scatterer::Medium(_) => phase_weight(own_pdf),
+            // What the cosine is to a surface: the phase function over that of even scattering.
+            Scatterer::Medium(_) => 4.0 * std::f32::consts::PI * own_pdf,
         };
         luminance(transmittance) * share.powi(learning.recording().cosine_power())
     }

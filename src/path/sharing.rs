@@ -213,11 +213,6 @@ impl SharedTile {
         let chosen = hash(seed.wrapping_add(square)) % (side * side);
         (y % side) * side + x % side == chosen
     }
-
-    /// Probability of [`Self::is_owner`].
-    fn owner_probability(&self) -> f32 {
-        1.0 / (self.owner_side * self.owner_side) as f32
-    }
 }
 
 impl Scatterer<'_> {
@@ -333,7 +328,8 @@ impl Second<'_, '_> {
                 fog.interior.crossing(carried, length, is_in_medium)
             });
             let area = cosine / squared;
-            density += tile.owner_probability() * pdf_solid_angle * area * crossing.density;
+            let owner_probability = 1.0 / (tile.owner_side * tile.owner_side) as f32;
+            density += owner_probability * pdf_solid_angle * area * crossing.density;
             connections.push(Connection {
                 pixel,
                 direction: -direction,

@@ -163,10 +163,6 @@ impl Scene {
         found
     }
 
-    fn material_at(&self, face: &Face<'_>) -> &Material {
-        &self.materials[self.triangle_materials[face.surface.0] as usize]
-    }
-
     /// How a face must move, given opaque ones in order.
     fn contact(&self, face: &Face<'_>, opaque: &[Face<'_>]) -> Option<Contact> {
         let is_near = |it: &&Face<'_>| {
@@ -196,7 +192,8 @@ impl Scene {
     /// Where a face and an opaque one of a parallel plane lie in the same and over each other, if they do.
     fn overlap(&self, face: &Face<'_>, opaque: &Face<'_>) -> Option<Overlap> {
         let cosine = face.normal.dot(opaque.normal);
-        let [above, below] = [face, opaque].map(|it| self.material_at(it));
+        let material = |face: &Face<'_>| self.triangle_materials[face.surface.0] as usize;
+        let [above, below] = [face, opaque].map(|face| &self.materials[material(face)]);
         // Of a pair, each is met from its own side only.
         if above.backed && below.backed && cosine < 0.0 {
             return None;

@@ -273,7 +273,8 @@ impl<'a> SurfacePoint<'a> {
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
         let normals = corner.normals();
         let smooth_normal = normals.map(|normals| corner.blend(normals));
-        let unmapped = smooth_normal.filter(is_a_direction).unwrap_or(front_normal);
+        let unmapped =
+            smooth_normal.filter(|normal| normal.length_squared() > 1e-12).unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
         let (texture, scale) = (material.texture(Slot::Normal), material.normal_scale);
         let mut normal = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
@@ -503,10 +504,6 @@ impl<'a> Corner<'a> {
 
 fn unit(x: f32) -> f32 {
     x.clamp(0.0, 1.0)
-}
-
-fn is_a_direction(normal: &Vec3) -> bool {
-    normal.length_squared() > 1e-12
 }
 
 /// Coefficient that turns white into the attenuation colour over the attenuation distance
