@@ -74,10 +74,11 @@ fn library() -> Result<&'static Library> {
         };
         let program = std::env::current_exe().and_then(std::fs::canonicalize).ok();
         let beside = program.and_then(|program| Some(program.parent()?.join(PLACE_BESIDE)));
-        let of_pip = if cfg!(windows) {
-            installed_by_pip_on_windows(|variable| std::env::var_os(variable).map(PathBuf::from))
+        let of_pip: Box<dyn Iterator<Item = PathBuf>> = if cfg!(windows) {
+            let variable = |name: &str| std::env::var_os(name).map(PathBuf::from);
+            Box::new(installed_by_pip_on_windows(variable))
         } else {
-            installed_by_pip(python_prefixes()).collect()
+            Box::new(installed_by_pip(python_prefixes()))
         };
         let found = beside.into_iter().flat_map(|folder| libraries_in(&folder)).chain(of_pip);
         first_that_loads(named.into_iter().chain(found))
@@ -148,18 +149,19 @@ fn installed_by_pip(prefixes: impl Iterator<Item = PathBuf>) -> impl Iterator<It
 
 /// The same on Windows, below the folders that these variables name: the environments in use, the user's packages, the
 /// user's Python and everybody's.
-fn installed_by_pip_on_windows(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
+fn installed_by_pip_on_windows(
+    variable: impl Fn(&str) -> Option<PathBuf>,
+) -> impl Iterator<Item = PathBuf> {
     const FOLDERS: [(&str, &str); 3] =
         [("APPDATA", "Python"), ("LOCALAPPDATA", "Programs/Python"), ("ProgramFiles", ".")];
-    let environments = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(&variable);
+    let environments = ["VIRTUAL_ENV", "CONDA_PREFIX"].map(&variable).into_iter().flatten();
     let installed = FOLDERS
         .into_iter()
-        .filter_map(|(name, folder)| Some(variable(name)?.join(folder)))
+        .filter_map(move |(name, folder)| Some(variable(name)?.join(folder)))
         .flat_map(|folder| newest_first(&folder, "Python"));
     (environments.chain(installed).filter(|python| python.is_absolute()))
         .flat_map(|python| ["site-packages", "Lib/site-packages"].map(|it| python.join(it)))
         .flat_map(|packages| libraries_in(&packages.join(PLACE_IN_PACKAGES)))
-        .collect()
 }
 
 /// What is in a folder, called so and then a version or none, the newest first: `python3.12`, `python3.9`,
@@ -339,6 +341,7 @@ mod tests {
             "ProgramFiles" => Some(folder("all")),
             _ => None,
         });
+        let found = found.collect::<Vec<_>>();
         let same = |found: &PathBuf, expected: &PathBuf| {
             std::fs::canonicalize(found).ok() == std::fs::canonicalize(expected).ok()
         };
