@@ -1,6 +1,6 @@
 //! Windows.
 
-use std::io;
+use std::io::{self, IsTerminal as _};
 use std::ops::Range;
 use std::os::windows::ffi::OsStrExt as _;
 use std::os::windows::process::CommandExt as _;
@@ -179,11 +179,16 @@ pub(crate) fn lower_thread_priority() {
 static HAS_LEFT_CONSOLE: AtomicBool = AtomicBool::new(false);
 
 /// Closes the console that the system opened for this process alone, as it does when a program is double-clicked;
-/// whether there was one.
+/// whether nobody can read stderr from now on. Where the manifest is obeyed no console was opened.
 pub(crate) fn leave_own_console() -> bool {
     // SAFETY: as many numbers as named are written, and the console may be left at any time.
-    let has_left =
-        unsafe { GetConsoleProcessList([0; 2].as_mut_ptr(), 2) == 1 && FreeConsole() != 0 };
+    let has_left = unsafe {
+        match GetConsoleProcessList([0; 2].as_mut_ptr(), 2) {
+            0 => GetStdHandle(STD_ERROR_HANDLE).is_null(),
+            1 => io::stderr().is_terminal() && FreeConsole() != 0,
+            _ => false,
+        }
+    };
     HAS_LEFT_CONSOLE.store(has_left, Ordering::Relaxed);
     has_left
 }
