@@ -57,10 +57,10 @@ fn processor() -> String {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::__cpuid;
-        /// The first of three leaves that hold the name, and where the last leaf is told ("Processor Brand String" of
-        /// Intel's and AMD's manuals).
-        const NAME: u32 = 0x8000_0002;
+        /// CPUID leaf whose `eax` is the highest extended leaf.
         const LAST: u32 = 0x8000_0000;
+        /// First of three leaves with the name ("Processor Brand String" of Intel's and AMD's manuals).
+        const NAME: u32 = 0x8000_0002;
         if __cpuid(LAST).eax >= NAME + 2 {
             let leaves = (NAME..NAME + 3).map(__cpuid);
             let words = leaves.flat_map(|leaf| [leaf.eax, leaf.ebx, leaf.ecx, leaf.edx]);

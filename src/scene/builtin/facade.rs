@@ -35,7 +35,7 @@ const FRONT: f32 = 0.28;
 const GROUND: f32 = 3.6;
 
 /// A house over `[x0, x1] x [z0, z1]` of `height`; fronts with windows on the sides marked in
-/// the order -X, +X, -Z, +Z, on so many floors above the ground floor, which has shop windows or not.
+/// the order -X, +X, -Z, +Z. `windows`: number of floors above the ground floor, and whether that has shop windows.
 pub(super) fn house(
     b: &mut Builder,
     m: &HouseMats,

@@ -47,7 +47,7 @@ fn control_group() -> Option<u64> {
     groups.filter_map(left_in_group).min()
 }
 
-/// What is left in one; pages of files that were read do not count, for they go first.
+/// Bytes left in a control group. The page cache is not counted as used: the kernel drops it first.
 fn left_in_group(group: &Path) -> Option<u64> {
     let read = |name| fs::read_to_string(group.join(name)).ok();
     let number = |name| read(name)?.trim().parse::<u64>().ok();
