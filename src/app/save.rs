@@ -69,7 +69,7 @@ impl Saves {
     }
 }
 
-/// Writes what is shown as `.png`, or the film with all layers as `.exr`.
+/// Writes what is shown as `.png`; as `.exr` the film with all layers, and what is shown without noise as one more.
 fn write(path: &Path, picture: &Picture) -> Result<()> {
     check_writable(path)?;
     let snapshot = &picture.snapshot;
@@ -100,7 +100,8 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
         tone_curve: document.look.curve,
         denoiser: document.look.denoise.then_some(document.look.denoiser),
         white_balance: document.look.white_balance,
-        layers: vec![LayerName::All],
+        layers: vec![LayerName::All, LayerName::Denoised],
+        ..PictureOptions::default()
     };
     // As it is shown. In linear light it is exact.
     let cached = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.origin == Origin::Cache);

@@ -8,7 +8,7 @@ use clap::builder::PossibleValue;
 #[cfg(feature = "window")]
 use crate::app::{interface::TileView, overlays::Overlay};
 use crate::environment::TableKind;
-use crate::output::LayerName;
+use crate::output::{LayerName, LinearRgb};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Gi, Sampling, Sharing};
@@ -137,6 +137,10 @@ choices! {
         Variance = "variance": "Variance of one sample's luminance"
         All = "all": "All of these"
         Denoised = "denoised": "Linear radiance without noise"
+    }
+    LinearRgb {
+        Rendered = "rendered": "What was rendered"
+        Denoised = "denoised": "Linear radiance without noise; what was rendered is a layer"
     }
 }
 

@@ -6,7 +6,7 @@ use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
 use crate::image::{is_same_file, name_of_process};
-use crate::output::{self, Exposure, Films, LayerName, PictureOptions};
+use crate::output::{self, Exposure, Films, LayerName, LinearRgb, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
 use crate::tone::{KELVIN, TINT, ToneCurve, WhiteBalance};
@@ -26,6 +26,16 @@ pub(super) struct PictureArguments {
     /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
     #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
     white: Option<WhiteBalance>,
+    /// What RGB of .exr pictures holds: what was rendered, or linear radiance without noise, with a layer of what was
+    /// rendered.
+    #[arg(
+        long,
+        default_value = "rendered",
+        value_enum,
+        value_name = "RGB",
+        help_heading = "Picture"
+    )]
+    rgb: LinearRgb,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, all of these, or
     /// denoised: linear radiance without noise.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
@@ -72,10 +82,14 @@ impl PictureArguments {
     /// Refuses names no picture is written by, and denoisers that are not there.
     pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
         pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
-        if self.denoise == Some(Denoise::Off) && self.layers.contains(&LayerName::Denoised) {
-            return Err(Error::new(
-                "--layers denoised wants a denoiser: it cannot be --denoise off",
-            ));
+        if self.denoise == Some(Denoise::Off) && self.denoises_linear() {
+            let option = match self.rgb {
+                LinearRgb::Denoised => "--rgb",
+                LinearRgb::Rendered => "--layers",
+            };
+            return Err(Error::new(format!(
+                "{option} denoised wants a denoiser: it cannot be --denoise off"
+            )));
         }
         if self.denoise == Some(Denoise::Oidn) { Denoiser::Oidn.check() } else { Ok(()) }
     }
@@ -95,10 +109,27 @@ impl PictureArguments {
         self.denoise.is_some_and(|denoise| denoise != Denoise::Off)
     }
 
+    fn denoises_linear(&self) -> bool {
+        self.rgb == LinearRgb::Denoised || self.layers.contains(&LayerName::Denoised)
+    }
+
+    /// Whether one of these pictures shows what was rendered as it is.
+    pub(super) fn shows_rendered<'a>(
+        &self,
+        pictures: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> bool {
+        self.rgb == LinearRgb::Rendered
+            && pictures.into_iter().any(|path| output::holds_layers(path))
+    }
+
     /// Says what was asked for that none of these pictures holds, and which denoiser was found.
     pub(super) fn say_unused(&self, pictures: &[PathBuf]) {
-        if !self.layers.is_empty() && !pictures.iter().any(|path| output::holds_layers(path)) {
+        let has_linear = pictures.iter().any(|path| output::holds_layers(path));
+        if !self.layers.is_empty() && !has_linear {
             notice("--layers adds nothing: they are written into .exr pictures alone");
+        }
+        if self.rgb != LinearRgb::default() && !has_linear {
+            notice("--rgb changes nothing: it is about .exr pictures alone");
         }
         if self.asks_for_denoiser() && !self.is_denoised(pictures) {
             notice("--denoise changes nothing: .exr pictures hold what was rendered");
@@ -121,10 +152,9 @@ impl PictureArguments {
     /// Whether noise is to be taken out of one of these pictures or, if a filter was asked for, of those
     /// that are made of a part.
     pub(super) fn is_denoised<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> bool {
-        let has_layer = self.layers.contains(&LayerName::Denoised);
         pictures.into_iter().any(|path| match self.denoise {
             Some(Denoise::Off) => false,
-            _ if output::holds_layers(path) => has_layer,
+            _ if output::holds_layers(path) => self.denoises_linear(),
             Some(_) => true,
             None => output::is_for_display(path),
         })
@@ -180,6 +210,7 @@ impl PictureArguments {
             exposure: self.exposure,
             tone_curve: self.tonemap,
             denoiser: self.denoiser().filter(|_| film.has_layers() || self.asks_for_denoiser()),
+            rgb: self.rgb,
             white_balance: self.white.unwrap_or_default(),
             layers: self.layers.clone(),
         }

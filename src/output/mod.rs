@@ -35,6 +35,16 @@ pub enum LayerName {
     Denoised,
 }
 
+/// What the RGB channels of linear pictures hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LinearRgb {
+    /// What was rendered.
+    #[default]
+    Rendered,
+    /// It without noise; what was rendered is a layer.
+    Denoised,
+}
+
 /// Exposure of 8-bit pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Exposure {
@@ -79,8 +89,10 @@ pub struct PictureOptions {
     pub exposure: Exposure,
     /// Tone curve of `.png` pictures.
     pub tone_curve: ToneCurve,
-    /// What takes the noise out of `.png` pictures and of [`LayerName::Denoised`].
+    /// What takes the noise out of `.png` pictures, of [`LayerName::Denoised`] and of [`LinearRgb::Denoised`].
     pub denoiser: Option<Denoiser>,
+    /// RGB of `.exr` pictures.
+    pub rgb: LinearRgb,
     /// White balance of `.png` pictures.
     pub white_balance: WhiteBalance,
     /// Extra layers of `.exr` pictures.
@@ -94,6 +106,7 @@ impl Default for PictureOptions {
             exposure: Exposure::Auto,
             tone_curve: ToneCurve::default(),
             denoiser: None,
+            rgb: LinearRgb::default(),
             white_balance: WhiteBalance::default(),
             layers: Vec::new(),
         }
@@ -162,12 +175,17 @@ pub fn write_picture(
     let film = films.film;
     if holds_layers(path) {
         let whole = film.without_gaps();
-        let (image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
-        if options.layers.contains(&LayerName::Denoised) && options.denoiser.is_some() {
+        let (mut image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
+        let is_rgb = options.rgb == LinearRgb::Denoised;
+        if (is_rgb || options.layers.contains(&LayerName::Denoised)) && options.denoiser.is_some() {
             metadata.extend(filter_metadata(options, films));
-            let pixels = shown(options, films)?.pixels;
-            let channels = split(&pixels, ["R", "G", "B"]);
-            layers.push(Layer { name: "denoised".to_owned(), channels });
+            let denoised = shown(options, films)?;
+            let (name, layer) = match is_rgb {
+                true => ("rendered", std::mem::replace(&mut image, denoised)),
+                false => ("denoised", denoised),
+            };
+            let channels = split(&layer.pixels, ["R", "G", "B"]);
+            layers.push(Layer { name: name.to_owned(), channels });
         }
         if let Some(alpha) = alpha_of(&whole, &metadata) {
             // OpenEXR's colours are multiplied by it, as are those of a film.
