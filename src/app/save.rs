@@ -8,7 +8,7 @@ use serde_json::json;
 use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
 use super::tasks::{TaskResult, Tasks};
-use super::worker::{Origin, Snapshot};
+use super::worker::Snapshot;
 use crate::error::{Notices, Result};
 use crate::image::check_writable;
 use crate::output::record::{Phases, Record, settings_of};
@@ -103,9 +103,8 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
         layers: vec![LayerName::All, LayerName::Denoised],
         ..PictureOptions::default()
     };
-    // As it is shown. In linear light it is exact.
-    let cached = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.origin == Origin::Cache);
-    let cached = cached.map(|backdrop| (&*backdrop.film, backdrop.worth));
+    // As it is shown. RGB of linear pictures is exact.
+    let cached = snapshot.cached_film().map(|cached| (&*cached.film, cached.worth));
     write_picture(path, &options, Films { film: record.film, cached }, record.metadata())
 }
 

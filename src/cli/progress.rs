@@ -51,13 +51,13 @@ impl Progress {
         self.bar.set_message(format!("{}{}", self.prefix, message.into()));
     }
 
-    /// Shows where a session is.
-    pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule) {
+    /// Shows where a session is, and the samples of cached light beside it with the seconds they took.
+    pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule, cached: (u32, f64)) {
         if !self.bar.is_hidden() {
-            self.say(line(session, rule, self.noise(session)));
+            self.say(line(session, rule, self.noise(session), cached));
         } else if self.written.get().elapsed() > LINE_EVERY {
             self.written.set(Instant::now());
-            let line = line(session, rule, self.noise(session));
+            let line = line(session, rule, self.noise(session), cached);
             tell(format_args!("lightgrid: {}{line}", self.prefix));
         }
     }
@@ -84,21 +84,21 @@ impl Progress {
     }
 }
 
-fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
+fn line(session: &Session<'_>, rule: &StopRule, noise: f64, cached: (u32, f64)) -> String {
     let figures = session.figures();
     if session.phase() == Phase::Learning {
         let (done, total) = (figures.learning_paths, session.view().learning_paths);
         return format!("learning {}%", 100 * done / total.max(1));
     }
-    let samples = session.samples();
+    let samples = session.samples() + cached.0;
     let mut text = rule.samples.map_or_else(
         || format!("rendering, {samples} samples"),
-        |limit| format!("rendering, {samples}/{limit} samples"),
+        |limit| format!("rendering, {samples}/{} samples", limit + cached.0),
     );
     if noise.is_finite() {
         text += &format!(", noise {:.1}%", 100.0 * noise);
     }
-    if let Some(left) = seconds_left(session, rule, noise) {
+    if let Some(left) = seconds_left(session, rule, noise, cached) {
         text += &format!(", {} left", in_words(left));
     }
     text
@@ -106,11 +106,16 @@ fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
 
 /// Shortest estimate of what the rules leave: samples at the speed so far, the clock, and noise
 /// falling with the root of the samples.
-fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f64> {
+fn seconds_left(
+    session: &Session<'_>,
+    rule: &StopRule,
+    noise: f64,
+    cached: (u32, f64),
+) -> Option<f64> {
     let figures = session.figures();
-    let rendered = figures.render_seconds;
+    let rendered = figures.render_seconds + cached.1;
     let pixels = f64::from(session.view().width) * f64::from(session.view().height);
-    let seconds_a_sample = rendered * pixels / figures.samples as f64;
+    let seconds_a_sample = rendered / (figures.samples as f64 / pixels + f64::from(cached.0));
     let by_samples = rule
         .samples
         .map(|limit| seconds_a_sample * f64::from(limit.saturating_sub(session.samples())));

@@ -179,11 +179,14 @@ impl Job<'_> {
         }
         drop(spare);
         let film = driver.film();
-        let cached = beside.film(driver.session.samples());
+        let cached = beside.film(&film);
         let mut remarks = output::remarks(&film, environment);
-        remarks.extend(cached.map(|(film, _)| {
-            let samples = film.min_samples();
-            format!("{samples} samples of cached light help to denoise it (--gi exact: none)")
+        remarks.extend(cached.map(|(cached, _)| {
+            let [exact, cached] = [&*film, cached].map(Film::min_samples);
+            format!(
+                "denoised from {} samples a pixel: {exact} exact, {cached} of cached light (--gi exact: none)",
+                exact + cached
+            )
         }));
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
@@ -368,7 +371,7 @@ fn work<'a>(
 ) -> Result<()> {
     let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
-        progress.show(&driver.session, &driver.rule);
+        progress.show(&driver.session, &driver.rule, (beside.counted(), beside.seconds));
         if beside.advance(driver, interrupt.asked())? {
             continue;
         }

@@ -30,14 +30,14 @@ const REACH: i32 = 40;
 impl<'a> Samples<'a> {
     pub(super) fn of(film: &'a Film, other: Option<(&'a Film, f32)>) -> Self {
         let of_pixel = |pixel: &Pixel| pixel.mean().into_iter().fold(0.0, f64::max);
-        let films = [Some(film), other.map(|(other, _)| other)];
-        let pixels = films.into_iter().flatten().flat_map(|film| film.pixels());
+        let samples = Self { film, other, scale: 1.0 };
+        let pixels = samples.films().flat_map(Film::pixels);
         let brightest = pixels.map(of_pixel).fold(0.0, f64::max);
         let scale = match brightest.log2().ceil() {
             exponent if exponent > f64::from(REACH) => 2.0_f64.powf(f64::from(REACH) - exponent),
             _ => 1.0,
         };
-        Self { film, other, scale }
+        Self { scale, ..samples }
     }
 
     /// A picture made of these samples, as bright as the film is.
@@ -50,22 +50,22 @@ impl<'a> Samples<'a> {
         image
     }
 
-    /// Samples of a pixel that are independent: those of the film that has more, for both begin with the same points.
+    /// Samples of a pixel in all films.
     pub(super) fn count(&self, index: usize) -> u32 {
-        self.fuller(index).pixels()[index].samples()
+        self.films().map(|film| film.pixels()[index].samples()).sum()
     }
 
-    /// Sums over the first hits of those samples.
+    /// Sums over the first hits of those samples, whatever their light counts.
     pub(super) fn first_hits(&self, index: usize) -> [f32; 8] {
-        self.fuller(index).surfaces()[index].sums().map(|sum| sum as f32)
+        let mut sums = [0.0; 8];
+        for film in self.films() {
+            sums.iter_mut().zip(film.surfaces()[index].sums()).for_each(|(sum, more)| *sum += more);
+        }
+        sums.map(|sum| sum as f32)
     }
 
-    fn fuller(&self, index: usize) -> &Film {
-        let count = |film: &Film| film.pixels()[index].samples() as f32;
-        // What counts less than its number is not as sharp.
-        let is_fuller =
-            |(other, worth): &(&Film, f32)| worth.min(1.0) * count(other) > count(self.film);
-        self.other.filter(is_fuller).map_or(self.film, |(other, _)| other)
+    fn films(&self) -> impl Iterator<Item = &'a Film> {
+        [Some(self.film), self.other.map(|(other, _)| other)].into_iter().flatten()
     }
 
     /// The picture as it is.
@@ -146,6 +146,6 @@ mod tests {
         let four = film(&[4.0]);
         let both = Samples::of(&single, Some((&four, 1.0)));
         assert_eq!((both.mean(0).rgb, both.mean(0).variance), (Vec3::splat(3.0), None));
-        assert_eq!(both.count(0), 1);
+        assert_eq!(both.count(0), 2);
     }
 }

@@ -11,9 +11,9 @@ use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
 
-/// One training path for this many paths rendered; it takes about twice as long as one of them. With
-/// twice as many, means of 8x8 pixels are better for their time by day, pixels worse.
-const TRAINING_SHARE: u64 = 8;
+/// One training path for this many paths rendered; it takes about twice as long as one of them. With half as many,
+/// means of 8x8 pixels have a quarter more error after as long, with twice as many pixels are worse.
+const TRAINING_SHARE: u64 = 4;
 /// Paths that find out how bright it is about where, before others train it.
 const PILOT_PATHS: u64 = 1 << 12;
 /// Fewest paths that train it.

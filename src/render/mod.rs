@@ -1,5 +1,6 @@
 //! Rendering: what is wanted ([`View`]), who does it ([`Session`]), what comes of it ([`film::Film`]).
 
+pub(crate) mod block_errors;
 pub(crate) mod cached_picture;
 mod cpu;
 mod devices;
@@ -17,8 +18,6 @@ mod pass;
 mod progress;
 mod session;
 mod sharing;
-#[cfg(feature = "window")]
-mod together;
 mod view;
 mod view_probe;
 

@@ -349,7 +349,7 @@ fn a_denoised_room_is_cleaner_for_cached_light_beside_its_samples() {
         let fixed = "--size 96x64 --device cpu --exposure 6.4 --denoise a-trous --reproducible";
         let output = bench.run(&format!("render {scene} {fixed} {rest}"));
         assert!(output.status.success(), "{}", text(&output.stderr));
-        text(&output.stderr).contains("samples of cached light")
+        text(&output.stderr).contains("of cached light")
     };
     assert!(says("office", "--spp 2 -o beside.png -o beside.exr"));
     assert!(!says("office", "--spp 2 --gi exact -o exact.png -o exact.exr"));
@@ -363,10 +363,15 @@ fn a_denoised_room_is_cleaner_for_cached_light_beside_its_samples() {
         png.windows(words.len()).any(|bytes| bytes == words)
     };
     assert!(names_it(&files[0][0]) && !names_it(&files[1][0]));
-    assert!(says("office", "--spp 2 --threads 1 -o again.png"));
+    assert!(says("office", "--spp 2 --threads 1 -o again.png -o again.exr"));
     assert!(fs::read(bench.path("again.png")).expect("written") == files[0][0]);
 
-    assert!(!says("office", "--spp 256 -o reference.png"), "there are enough of its own");
+    // Where exact samples are not wanted for themselves, both together are what was asked for.
+    let output = bench.run("render office --spp 12 --size 96x64 --device cpu -o both.png");
+    let words = "denoised from 12 samples a pixel: 2 exact, 10 of cached light";
+    assert!(text(&output.stderr).contains(words), "{}", text(&output.stderr));
+
+    assert!(!says("office", "--spp 256 --gi exact -o reference.png -o reference.exr"));
     let reference = read_rgb(&bench.path("reference.png"));
     let [beside, exact] = ["beside.png", "exact.png"].map(|name| {
         let levels = read_rgb(&bench.path(name));
@@ -381,8 +386,21 @@ fn a_denoised_room_is_cleaner_for_cached_light_beside_its_samples() {
     assert!(layer.windows(11).any(|bytes| bytes == b"denoised.R\0"));
     let picture = |name: &str| read_picture(&bench.path(name)).expect("written");
     assert_eq!(picture("layer.exr"), picture("exact.exr"));
-    let refused = bench.run("render office --layers denoised --denoise off -o a.exr");
-    assert!(text(&refused.stderr).contains("wants a denoiser"), "{}", text(&refused.stderr));
+    // And in place of what was rendered, which is a layer then.
+    assert!(says("office", "--spp 4 --rgb denoised -o rgb.exr"));
+    let rgb = fs::read(bench.path("rgb.exr")).expect("written");
+    assert!(rgb.windows(11).any(|bytes| bytes == b"rendered.R\0"));
+    let reference = picture("reference.exr");
+    let [rgb, noisy] = ["rgb.exr", "exact.exr"].map(|name| {
+        let picture = picture(name);
+        let pairs = picture.pixels.as_flattened().iter().zip(reference.pixels.as_flattened());
+        pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>()
+    });
+    assert!(rgb < 0.3 * noisy, "squared error {} of what was rendered", rgb / noisy);
+    for option in ["--layers", "--rgb"] {
+        let refused = bench.run(&format!("render office {option} denoised --denoise off -o a.exr"));
+        assert!(text(&refused.stderr).contains("wants a denoiser"), "{}", text(&refused.stderr));
+    }
 
     for rest in ["--spp 1 --part 1/1 -o a.part", "--spp 1 --sampling plain -o a.png"] {
         assert!(!says("office", rest), "{rest}");

@@ -43,7 +43,7 @@ impl Whole {
     fn new(snapshot: &Snapshot, image: Arc<Image>) -> Option<Self> {
         let (request, film) = (&snapshot.request, &snapshot.main.film);
         let keyframe = Keyframe::new(&request.world, &request.view, film, image)?;
-        let samples = snapshot.main.mean_samples();
+        let samples = snapshot.film_samples();
         Some(Self { request: Arc::clone(request), keyframe, samples })
     }
 
@@ -81,7 +81,7 @@ impl Carried {
         if self.last.as_ref().is_some_and(|last| last.request.view != request.view) {
             self.before = self.last.take();
         }
-        let samples = snapshot.main.mean_samples();
+        let samples = snapshot.film_samples();
         self.before.take_if(|before| before.worth(&request.view, samples) == 0.0);
         self.last = Whole::new(snapshot, image);
     }
@@ -109,7 +109,7 @@ impl Carried {
             let met = Some(&**film).filter(|_| order.ahead.is_none());
             under(&whole.keyframe.seen_in(&view, met), image, [view.width, view.height])
         } else {
-            let samples = snapshot.main.mean_samples();
+            let samples = snapshot.film_samples();
             let worth = whole.worth(view, samples);
             let is_compared = order.compared.is_some() || snapshot.plain.is_some();
             let is_raw = order.denoiser.is_none() && snapshot.is_whole();

@@ -9,7 +9,8 @@ use super::request::Request;
 use super::sessions::SLICE;
 use super::snapshot::{Backdrop, Origin, SessionSnapshot};
 use crate::render::Session;
-use crate::render::cached_picture::{self, CachedPicture};
+use crate::render::block_errors::{BlockErrors, block_errors};
+use crate::render::cached_picture::{CachedPicture, worth};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 
@@ -31,6 +32,8 @@ pub(super) const PLAIN: usize = 1;
 pub(super) struct Preview {
     /// A film of what was seen last.
     earlier: Option<EarlierFilm>,
+    /// The main film that was shown last, the number of cached samples beside it, and the errors of both.
+    errors: Option<(Weak<Film>, u64, Option<BlockErrors>)>,
     /// The main and the plain picture, as they were copied last.
     copies: [Option<FilmCopy>; 2],
     /// The cached picture, as it was copied last, of so many samples.
@@ -187,52 +190,54 @@ impl Preview {
         (snapshot, cost)
     }
 
-    /// The film that is shown together with the main picture's own of so many samples a pixel: the cached one once it
-    /// has clearly more to say than the one from before, as chance and gaps between its first pixels count against it.
+    /// The film that is shown together with the main picture's `exact` one, and the errors of both where they are known:
+    /// the cached film once it has clearly more to say than the one from before, as chance and gaps between its first
+    /// pixels count against it.
     pub(super) fn backdrop(
         &mut self,
         request: &Arc<Request>,
-        samples: u32,
-        cached: &CachedPicture<Session<'_>>,
-    ) -> Option<Backdrop> {
+        exact: &Arc<Film>,
+        cached: Option<&CachedPicture<Session<'_>>>,
+    ) -> (Option<Backdrop>, Option<BlockErrors>) {
         // A film that was kept of this request has the same samples.
         let earlier = self.earlier.as_ref().filter(|earlier| !earlier.is_of(request));
         let earlier = earlier.and_then(|earlier| earlier.backdrop(&request.view));
         let seen = earlier.as_ref().map_or(0, |earlier| earlier.samples);
-        let cached = self.cached_film(cached, 3 * seen / 2).filter(|_| request.wants_cached);
+        let cached = cached.filter(|_| request.wants_cached);
+        let cached = cached.and_then(|cached| self.cached_film(cached, 3 * seen / 2));
+        let samples = cached.as_ref().map_or(0, |(samples, _)| *samples);
+        let known = self.errors.take().filter(|(of, beside, _)| {
+            std::ptr::eq(of.as_ptr(), Arc::as_ptr(exact)) && *beside == samples
+        });
+        let other = cached.as_ref().map(|(_, film)| &**film);
+        let found = || block_errors(exact, other.filter(|film| exact.is_alike(film)));
+        let errors = known.map_or_else(found, |(.., errors)| errors);
+        self.errors = Some((Arc::downgrade(exact), samples, errors));
         let shown = match cached {
-            Some((of, film)) => {
-                let worth = cached_picture::worth(samples);
-                Some(Backdrop { film, samples: of, worth, origin: Origin::Cache })
+            Some((samples, film)) => {
+                let worth = worth(exact, &film, errors.as_ref());
+                Some(Backdrop { film, samples, worth, origin: Origin::Cache })
             }
             None => earlier,
         };
-        shown.filter(|backdrop| backdrop.worth > 0.0)
+        (shown.filter(|backdrop| backdrop.worth > 0.0), errors)
     }
 
     /// The cached picture's film and how many samples that has, if these are more than `least` and all over the
-    /// picture. A copy is made unless there is a new one already or, while the window rests, any: it is megabytes and
-    /// is soon complete.
+    /// picture. A copy is made unless there is a new one already or, while the window rests, any: it is megabytes.
     fn cached_film(
         &mut self,
-        cached: &CachedPicture<Session<'_>>,
+        CachedPicture { session, .. }: &CachedPicture<Session<'_>>,
         least: u64,
     ) -> Option<(u64, Arc<Film>)> {
         let copy = self.cached_copy.take();
-        match cached {
-            CachedPicture::UnderWay(session)
-                if session.figures().samples > least && session.is_begun() =>
-            {
-                let samples = session.figures().samples;
-                let copy = copy.filter(|(of, _)| self.rests || *of == samples);
-                let copy = copy.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
-                Some(self.cached_copy.insert(copy).clone())
-            }
-            CachedPicture::Complete(samples, film) if *samples > least => {
-                Some((*samples, Arc::clone(film)))
-            }
-            _ => None,
+        let samples = session.figures().samples;
+        if samples <= least || !session.is_begun() {
+            return None;
         }
+        let copy = copy.filter(|(of, _)| self.rests || *of == samples);
+        let copy = copy.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
+        Some(self.cached_copy.insert(copy).clone())
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) struct SuspendedPicture {
     pub(super) request: Arc<Request>,
     pub(super) session: SessionState,
     /// The picture by cached light beside it.
-    pub(super) cached: CachedPicture<SessionState>,
+    pub(super) cached: Option<CachedPicture<SessionState>>,
     /// What learning had counted, for inspection.
     pub(super) counters: Option<Arc<LearningGrid>>,
     /// How its error fell.
@@ -45,19 +45,15 @@ impl SuspendedPicture {
     /// Whether it has taken long, and there is room for it; if need be without the picture by cached light.
     pub(super) fn is_worth_it(&mut self) -> bool {
         if self.memory_bytes() > MAX_LEFT_BYTES {
-            self.cached = CachedPicture::Absent;
+            self.cached = None;
         }
         let seconds = self.session.elapsed_seconds() + self.cached_seconds;
         seconds >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
     }
 
     fn memory_bytes(&self) -> usize {
-        let cached = match &self.cached {
-            CachedPicture::Absent => 0,
-            CachedPicture::UnderWay(session) => session.memory_bytes(),
-            CachedPicture::Complete(_, film) => film.memory_bytes(),
-        };
-        self.session.memory_bytes() + cached
+        let cached = self.cached.as_ref().map(|cached| cached.session.memory_bytes());
+        self.session.memory_bytes() + cached.unwrap_or(0)
     }
 
     /// Bytes of its map, unless that is the one in use.

@@ -7,6 +7,7 @@ use super::request::Request;
 use crate::app::threads::lock;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::radiance_cache::CacheFacts;
+use crate::render::block_errors::BlockErrors;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu, GpuFigures};
 use crate::render::{Figures, Sampling, View};
@@ -120,6 +121,8 @@ pub(crate) struct Snapshot {
     pub backdrop: Option<Backdrop>,
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
     pub cached_seconds: f64,
+    /// Errors of the films that are shown without noise, where they are known.
+    pub errors: Option<BlockErrors>,
     /// A sentence where paths end with much of their light left.
     pub cut_off: Option<Arc<str>>,
     /// Whoever shows it says here when the next one will be wanted.
@@ -177,9 +180,25 @@ impl Backdrop {
 }
 
 impl Snapshot {
-    /// Samples a pixel of the picture by now, in the mean.
+    /// Samples a pixel of the picture by now, in the mean, of cached light too.
     pub(crate) fn mean_samples(&self) -> f64 {
-        self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
+        let main = self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64;
+        main + self.cached_samples()
+    }
+
+    /// The same of the films that are shown.
+    pub(crate) fn film_samples(&self) -> f64 {
+        self.main.mean_samples() + self.cached_samples()
+    }
+
+    fn cached_samples(&self) -> f64 {
+        let cached = self.cached_film();
+        cached.map_or(0.0, |it| it.samples as f64 / it.film.pixels().len().max(1) as f64)
+    }
+
+    /// The film by cached light that is shown.
+    pub(crate) fn cached_film(&self) -> Option<&Backdrop> {
+        self.backdrop.as_ref().filter(|backdrop| backdrop.origin == Origin::Cache)
     }
 
     /// Seconds of learning and rendering, cached light included.

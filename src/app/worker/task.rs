@@ -13,10 +13,11 @@ use super::sessions::Sessions;
 use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
-use crate::render::cached_picture::{CachedPicture, suits, worth};
+use crate::render::block_errors::block_errors;
+use crate::render::cached_picture::{CachedPicture, suits, view, worth};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
-use crate::render::{Gi, Phase, Sampling, Session, StopRule, View, cut_off_notice};
+use crate::render::{Phase, Sampling, Session, StopRule, View, cut_off_notice};
 
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
@@ -45,13 +46,13 @@ struct Pictures<'s> {
     main: Session<'s>,
     /// The plain picture of a split view.
     plain: Option<Session<'s>>,
-    cached: CachedPicture<Session<'s>>,
+    cached: Option<CachedPicture<Session<'s>>>,
     /// Turns of the cached one in a row.
     turns: u32,
 }
 
 impl<'s> Pictures<'s> {
-    fn new(main: Session<'s>, cached: CachedPicture<Session<'s>>) -> Self {
+    fn new(main: Session<'s>, cached: Option<CachedPicture<Session<'s>>>) -> Self {
         Self { main, plain: None, cached, turns: 0 }
     }
 
@@ -62,8 +63,12 @@ impl<'s> Pictures<'s> {
             // A radiance cache is trained out of sight, but that learning is over is to be seen.
             figures.learning_paths + figures.samples + u64::from(figures.training_paths > 0)
         };
-        let sessions = [Some(&self.main), self.plain.as_ref(), self.cached.session()];
+        let sessions = [Some(&self.main), self.plain.as_ref(), self.cached_session()];
         sessions.into_iter().flatten().map(progress).sum()
+    }
+
+    fn cached_session(&self) -> Option<&Session<'s>> {
+        self.cached.as_ref().map(|cached| &cached.session)
     }
 
     /// Whether the plain picture of a split view has had the time of the main one, learning included. What that is
@@ -119,7 +124,7 @@ impl<'a> PictureTask<'a> {
             // The CPU affords less until there are kernels for it.
             session = self.sessions.small_session(false);
         }
-        let mut pictures = Pictures::new(session, CachedPicture::Absent);
+        let mut pictures = Pictures::new(session, None);
         while !self.sessions.watch.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
             let cut = pictures.main.samples() > 0;
@@ -161,13 +166,19 @@ impl<'a> PictureTask<'a> {
                 Activity::Learning(_) => self.learn(&mut pictures.main),
                 Activity::Rendering | Activity::Moving => self.take_turn(&mut pictures),
             }
-            pictures.cached.complete(|session| self.sessions.keep_training(session));
             self.publish_if_due(activity, &pictures);
         }
         if self.request().previews {
             self.leave(pictures);
         } else {
-            pictures.cached.end(|session| self.sessions.keep_training(session));
+            self.end_cached(&mut pictures.cached);
+        }
+    }
+
+    /// Drops the cached picture, but for what has trained its cache.
+    fn end_cached(&mut self, cached: &mut Option<CachedPicture<Session<'a>>>) {
+        if let Some(mut cached) = cached.take() {
+            self.sessions.keep_training(&mut cached.session);
         }
     }
 
@@ -180,10 +191,10 @@ impl<'a> PictureTask<'a> {
             self.inspection.curves[MAIN] = left.curve;
             let (world, environment) = (self.sessions.world, self.sessions.environment);
             let resume = |state| Session::resume(world, environment, state);
-            let cached = left.cached.map(|state| {
-                let mut session = resume(state);
-                self.sessions.take_up_training(&mut session);
-                session
+            let cached = left.cached.map(|cached| {
+                let mut cached = cached.map(resume);
+                self.sessions.take_up_training(&mut cached.session);
+                cached
             });
             let pictures = Pictures::new(resume(left.session), cached);
             // Before it goes on.
@@ -199,24 +210,19 @@ impl<'a> PictureTask<'a> {
             self.counters = counted;
             session
         };
-        Pictures::new(main, CachedPicture::Absent)
+        Pictures::new(main, None)
     }
 
     /// Begins the cached and the plain picture where they are wanted, and ends them where they are not.
     fn begin_and_end_others(&mut self, pictures: &mut Pictures<'a>) {
         let Pictures { main, plain, cached, .. } = pictures;
         let request = Arc::clone(self.request());
-        let may_want_cached = self.may_want_cached(main);
-        if !(request.wants_cached && may_want_cached) {
-            // One that is complete may be wanted again with the next key.
-            let is_complete = matches!(cached, CachedPicture::Complete(..));
-            if !(is_complete && may_want_cached) {
-                cached.end(|session| self.sessions.keep_training(session));
-            }
-        } else if matches!(cached, CachedPicture::Absent) && self.is_time_for_cached(main) {
-            let view = View { gi: Gi::Cached, ..request.view.clone() };
-            let session = self.sessions.experienced_session(view);
-            *cached = CachedPicture::UnderWay(Box::new(session));
+        // Where it is not wanted by now it may be with the next key.
+        if !self.may_want_cached() {
+            self.end_cached(cached);
+        } else if request.wants_cached && cached.is_none() && self.is_time_for_cached(main) {
+            *cached =
+                Some(CachedPicture::new(self.sessions.experienced_session(view(&request.view))));
         }
         if !request.split {
             *plain = None;
@@ -256,38 +262,33 @@ impl<'a> PictureTask<'a> {
     /// Puts the picture aside for another one.
     fn leave(&mut self, pictures: Pictures<'_>) {
         let Pictures { main, mut cached, .. } = pictures;
-        if let CachedPicture::UnderWay(session) = &mut cached
+        if let Some(cached) = &mut cached
             && self.sessions.watch.is_left_for_same_light()
         {
-            self.sessions.keep_training(session);
+            self.sessions.keep_training(&mut cached.session);
         }
-        // What is seen of it is better than the film alone.
-        let times = worth(main.samples());
-        let shown = cached.film_so_far().filter(|_| times >= 1.0 && main.samples() > 0);
-        let shown = shown.map(|cached| cached.together(main.film(), times));
+        // The film that says more is seen until the next picture does.
+        let film = cached.as_ref().and_then(CachedPicture::film_so_far);
+        if let Some(film) = film.filter(|_| main.samples() > 0) {
+            let errors = block_errors(main.film(), Some(film));
+            self.keep_earlier(Cow::Borrowed(film), worth(main.film(), film, errors.as_ref()));
+        }
         let mut left = SuspendedPicture {
             request: Arc::clone(self.request()),
             session: main.suspend(),
-            cached: cached.map(Session::suspend),
+            cached: cached.map(|cached| cached.map(Session::suspend)),
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.inspection.curves[MAIN]),
             cached_seconds: self.cached_seconds,
         };
         let is_worth_it = left.is_worth_it();
-        match shown {
-            Some(shown) => self.keep_earlier(Cow::Owned(shown), times),
-            None if !is_worth_it => {
-                return self.keep_earlier(Cow::Owned(left.session.into_film()), 1.0);
-            }
-            None => {
-                if let Some(film) = left.session.film() {
-                    self.keep_earlier(Cow::Borrowed(film), 1.0);
-                }
-            }
+        if !is_worth_it {
+            return self.keep_earlier(Cow::Owned(left.session.into_film()), 1.0);
         }
-        if is_worth_it {
-            self.sessions.kept.leave(left);
+        if let Some(film) = left.session.film() {
+            self.keep_earlier(Cow::Borrowed(film), 1.0);
         }
+        self.sessions.kept.leave(left);
     }
 
     fn keep_earlier(&mut self, film: Cow<'_, Film>, worth: f32) {
@@ -297,7 +298,7 @@ impl<'a> PictureTask<'a> {
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached
     /// one a few turns in a row, or the main one.
     fn take_turn(&mut self, pictures: &mut Pictures<'_>) {
-        let rule = self.rule();
+        let rule = self.rule(pictures);
         // What they take is compared on the same device.
         if let Some(plain) = &mut pictures.plain
             && [&mut pictures.main, plain].into_iter().any(|session| !self.sessions.place(session))
@@ -305,10 +306,14 @@ impl<'a> PictureTask<'a> {
             return;
         }
         let is_plain_next = pictures.plain.is_some() && !pictures.are_level(&rule);
+        let wants_cached = self.request().wants_cached;
         let Pictures { main, plain, cached, turns } = pictures;
+        let cached = cached.as_mut().filter(|_| wants_cached);
         if let Some(plain) = plain.as_mut().filter(|_| is_plain_next) {
             self.sessions.advance_in_place(plain, None, true);
-        } else if let Some(cached) = cached.next(main, *turns) {
+        } else if let Some(cached) =
+            cached.and_then(|cached| cached.next(main, *turns, rule.noise.is_some()))
+        {
             let start = Instant::now();
             // Where it is shown no GPU is quicker, and one that is being made ready will show none.
             let cut = self.request().previews;
@@ -329,11 +334,10 @@ impl<'a> PictureTask<'a> {
 
     /// Whether light from a radiance cache can be shown beside what there is, if it is asked for: not where a real
     /// GPU has many samples in a moment, nor where pictures are compared, and outside only for its own sake.
-    fn may_want_cached(&self, main: &Session<'_>) -> bool {
+    fn may_want_cached(&self) -> bool {
         (self.suits_cached || self.request().inspects_cache)
             && !self.request().split
             && !self.sessions.device.is_quick(self.request())
-            && worth(main.samples()) > 0.0
     }
 
     /// Where the cache is to be trained first, every pixel has its first exact sample before.
@@ -342,11 +346,14 @@ impl<'a> PictureTask<'a> {
             && (main.samples() > 0 || self.sessions.kept.has_training_for(self.request()))
     }
 
-    /// When the main picture is done: what the cached one took counts.
-    fn rule(&self) -> StopRule {
+    /// When the main picture is done: what the cached one took counts, and so do its samples while it is shown.
+    fn rule(&self, pictures: &Pictures<'_>) -> StopRule {
         let rule = self.request().rule;
+        let cached = pictures.cached_session().filter(|_| self.request().wants_cached);
+        let cached = cached.map_or(0, Session::samples);
         let seconds = rule.seconds.map(|seconds| seconds - self.cached_seconds);
-        StopRule { seconds, ..rule }
+        let samples = rule.samples.map(|samples| samples.saturating_sub(cached));
+        StopRule { seconds, samples, ..rule }
     }
 
     /// What is to be done next; `None` when something else is asked for.
@@ -354,7 +361,7 @@ impl<'a> PictureTask<'a> {
         if !self.sessions.watch.takes_up_latest() {
             return None;
         }
-        let (request, rule, main) = (self.request(), self.rule(), &pictures.main);
+        let (request, rule, main) = (self.request(), self.rule(pictures), &pictures.main);
         // Begun later, it has the same time to come.
         let is_compared = !request.split || pictures.are_level(&rule);
         Some(if request.paused {
@@ -439,6 +446,8 @@ impl<'a> PictureTask<'a> {
             reading += cost;
             snapshot
         });
+        let (backdrop, errors) =
+            self.preview.backdrop(&request, &main_snapshot.film, cached.as_ref());
         let is_quick = self.sessions.device.is_quick(&request);
         let cut_off = self.cut_off(&request, main.samples());
         let kept = &mut *self.sessions.kept;
@@ -450,11 +459,12 @@ impl<'a> PictureTask<'a> {
             now: main.figures(),
             plain,
             counters: self.counters.clone(),
-            backdrop: self.preview.backdrop(&request, main.samples(), cached),
+            backdrop,
+            errors,
             cached_seconds: self.cached_seconds,
             cut_off,
             cache: self.inspection.cache_facts(
-                cached.session().unwrap_or(main),
+                cached.as_ref().map_or(main, |cached| &cached.session),
                 &request,
                 kept,
                 is_quick,

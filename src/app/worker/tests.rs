@@ -45,6 +45,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
         backdrop: None,
         cut_off: None,
         cached_seconds: 0.0,
+        errors: None,
         rest: Arc::new(PublishThrottle::new()),
     }
 }

@@ -8,9 +8,10 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::memory;
 use crate::path::World;
+use crate::render::block_errors::block_errors;
 use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
-use crate::render::{Driver, Sampling, Session, View};
+use crate::render::{Driver, Sampling, Session, StopRule, View};
 
 /// Least width and height of a picture that is worth a radiance cache: its first paths take as long as some samples of a
 /// smaller one.
@@ -21,10 +22,12 @@ pub(super) struct Beside<'a> {
     world: &'a World,
     environment: &'a Environment,
     is_wanted: bool,
-    picture: CachedPicture<Session<'a>>,
-    /// Seconds that it has taken, and those that were asked for.
+    /// Whether exact samples are wanted for themselves. Else what was asked for is the number of both together.
+    wants_exact: bool,
+    picture: Option<CachedPicture<Session<'a>>>,
+    /// Seconds that it has taken.
     pub(super) seconds: f64,
-    asked: Option<f64>,
+    asked: StopRule,
 }
 
 impl<'a> Beside<'a> {
@@ -42,7 +45,6 @@ impl<'a> Beside<'a> {
         let is_wanted = arguments.gi.is_none()
             && !is_kept
             && is_one
-            && worth(arguments.stop_rule().samples.unwrap_or(0)) > 0.0
             && view.sampling == Sampling::Adaptive
             && view.width.min(view.height) >= MIN_SIZE
             && arguments.picture.is_denoised(arguments.pictures())
@@ -52,9 +54,11 @@ impl<'a> Beside<'a> {
             world,
             environment,
             is_wanted,
-            picture: CachedPicture::Absent,
+            wants_exact: arguments.noise.is_some()
+                || arguments.picture.shows_rendered(arguments.pictures()),
+            picture: None,
             seconds: 0.0,
-            asked: arguments.seconds,
+            asked: arguments.stop_rule(),
         }
     }
 
@@ -64,28 +68,40 @@ impl<'a> Beside<'a> {
     /// As [`Session::advance`].
     pub(super) fn advance(&mut self, driver: &mut Driver<'_>, cancel: &AtomicBool) -> Result<bool> {
         let main = &driver.session;
+        let is_met = driver.rule.samples.is_some_and(|limit| main.samples() >= limit);
+        let is_done = is_met && !self.wants_exact;
         let may_go_on = self.is_wanted
             && !main.is_on_gpu()
             && main.samples() > 0
-            && worth(main.samples()) > 0.0
+            && !is_done
             && !cancel.load(Ordering::Relaxed);
         if !may_go_on {
             return Ok(false);
         }
         let start = Instant::now();
-        if matches!(self.picture, CachedPicture::Absent) {
-            self.picture = CachedPicture::beside(main, self.world, self.environment)?;
-        }
-        let Some(session) = self.picture.next(main, 0) else { return Ok(false) };
+        let picture = match &mut self.picture {
+            Some(picture) => picture,
+            None => self.picture.insert(CachedPicture::beside(main, self.world, self.environment)?),
+        };
+        let Some(session) = picture.next(main, 0, self.wants_exact) else { return Ok(false) };
         session.advance(1, cancel)?;
         self.seconds += start.elapsed().as_secs_f64();
-        driver.rule.seconds = self.asked.map(|asked| asked - self.seconds);
+        driver.rule.seconds = self.asked.seconds.map(|asked| asked - self.seconds);
+        let counted = self.counted();
+        driver.rule.samples = self.asked.samples.map(|asked| asked.saturating_sub(counted));
         Ok(true)
     }
 
-    /// The film by cached light, and the weight of its samples beside exact ones, of which each pixel has `samples`.
-    pub(super) fn film(&self, samples: u32) -> Option<(&Film, f32)> {
-        let worth = worth(samples);
-        self.picture.film_so_far().filter(|_| worth > 0.0).map(|film| (film, worth))
+    /// Its samples a pixel as far as they count among those that were asked for.
+    pub(super) fn counted(&self) -> u32 {
+        let picture = self.picture.as_ref().filter(|_| !self.wants_exact);
+        picture.map_or(0, |picture| picture.session.samples())
+    }
+
+    /// The film by cached light, and what one of its samples counts beside one of the exact `film`.
+    pub(super) fn film(&self, film: &Film) -> Option<(&Film, f32)> {
+        let cached = self.picture.as_ref()?.film_so_far()?;
+        let errors = block_errors(film, Some(cached));
+        Some((cached, worth(film, cached, errors.as_ref())))
     }
 }
