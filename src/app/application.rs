@@ -200,6 +200,7 @@ impl App {
                 overlay: self.interface.overlay,
                 magnification: self.interface.magnification(document.size),
                 pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
+                is_denoised: document.look.denoise,
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status);

@@ -25,6 +25,8 @@ pub(super) const ACCENT: Color32 = Color32::from_rgb(240, 176, 84);
 pub(super) const ALERT: Color32 = Color32::from_rgb(238, 120, 104);
 /// The other of two compared things.
 pub(super) const SECOND: Color32 = Color32::from_rgb(110, 168, 240);
+/// What is good as it is.
+pub(super) const DONE: Color32 = Color32::from_rgb(120, 200, 130);
 
 /// Sets fonts, colours and spacing of a context.
 pub(super) fn apply(context: &egui::Context) {

@@ -54,6 +54,10 @@ pub(in crate::app) fn show(
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
         "Keeps the learned distributions, around their old centre, when the camera or a setting changes",
     );
+    if let Some(snapshot) = snapshot {
+        theme::section(ui, "PICTURE");
+        picture(ui, snapshot);
+    }
     theme::section(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
         Some(inspected) => {
@@ -270,6 +274,39 @@ fn cell(
         }
     });
     table(ui, inspected, inspector);
+}
+
+/// How far the picture is off, and what it takes.
+fn picture(ui: &mut Ui, snapshot: &Snapshot) {
+    let session = &snapshot.main;
+    let percent = |share: f32| match share.is_finite() {
+        true => format!("{:.1} %", 100.0 * share),
+        false => "not known yet".to_owned(),
+    };
+    let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
+    let map = snapshot.request.environment.memory_bytes();
+    let [grid, table, pixels] = [grid, map.table, map.pixels].map(theme::bytes);
+    Grid::new("picture").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
+        let mut line = |name: &str, value: String, hint: &str| {
+            fact(ui, name, value).on_hover_text(hint);
+        };
+        line(
+            "Noise",
+            percent(session.noise as f32),
+            "Estimated relative RMS error of the pixels by exact samples alone, before denoising; too small by half with two to four samples where light is hard to find",
+        );
+        line(
+            "Error of areas",
+            percent(snapshot.errors.map_or(f32::NAN, |errors| errors.left())),
+            "Estimated relative RMS error of means of 16x16 pixels, which a denoiser leaves",
+        );
+        line(
+            "Cached light",
+            percent(snapshot.errors.map_or(0.0, |errors| errors.share())),
+            "Its share of the picture: less noise and an error of its own, for which the share falls as samples arrive",
+        );
+        line("Memory", grid.clone(), &format!("Light Grid {grid}, importance table {table}, map {pixels}"));
+    });
 }
 
 fn facts(ui: &mut Ui, inspected: &Inspected) {

@@ -5,7 +5,7 @@ use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 use crate::app::overlays::{Overlay, value_text};
 use crate::app::rendering::Rendering;
 use crate::app::theme;
-use crate::app::worker::{Activity, Origin, Snapshot};
+use crate::app::worker::{Activity, Snapshot};
 
 /// What the line is drawn from.
 pub(in crate::app) struct Status<'a> {
@@ -21,13 +21,24 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) magnification: Option<f32>,
     /// Place of the picture under the pointer, both coordinates in `[0,1]`.
     pub(in crate::app) pointed: Option<glam::Vec2>,
+    /// Whether what is shown is without noise.
+    pub(in crate::app) is_denoised: bool,
     /// Figures that depend on the clock are left out.
     pub(in crate::app) hides_clock: bool,
 }
 
-/// With fewer samples a pixel noise is told too small where light is hard to find: by half with two to four in the
-/// office.
-const FEW: u32 = 8;
+/// What a picture is good for: word, colour, hint, and the largest relative error of blocks without noise, and of pixels
+/// with it. (Blocks of 1 and 2.5 % are FLIP of 0.05 and 0.09.)
+const GRADES: [(&str, Color32, &str, [f32; 2]); 3] = [
+    ("Final", theme::DONE, "More samples change nothing that is seen", [0.01, 0.03]),
+    (
+        "Preview",
+        theme::TEXT,
+        "Light and colours are right; soft shadows may still change",
+        [0.025, 0.1],
+    ),
+    ("Draft", theme::SECOND, "Light and shadows may still change", [f32::INFINITY; 2]),
+];
 
 /// Draws the line.
 pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
@@ -51,7 +62,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
                     ui.shrink_clip_rect(ui.max_rect());
                     phase(ui, status);
                     if let Some(snapshot) = &status.rendering.snapshot {
-                        figures(ui, snapshot, status.hides_clock);
+                        figures(ui, snapshot, status);
                     }
                 });
             });
@@ -102,9 +113,7 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
         }
         Activity::Rendering => word(ui, "Rendering", theme::ACCENT, "Adding samples"),
         Activity::Paused => word(ui, "Paused", theme::SECOND, "Space resumes"),
-        Activity::Done => {
-            word(ui, "Done", Color32::from_rgb(120, 200, 130), "A limit under STOP AT was reached");
-        }
+        Activity::Done => word(ui, "Done", theme::DONE, "A limit under STOP AT was reached"),
     }
 }
 
@@ -112,10 +121,30 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
     ui.label(RichText::new(text).color(color).strong()).on_hover_text(hint);
 }
 
-fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
+fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
     let session = &snapshot.main;
-    number(ui, &theme::samples(snapshot.mean_samples()), "samples", "Mean samples per pixel");
-    if !hides_clock {
+    if matches!(snapshot.activity, Activity::Rendering | Activity::Paused | Activity::Done) {
+        let (error, column, of) = match status.is_denoised {
+            true => (snapshot.errors.map(|errors| errors.left()), 0, "areas of 16 pixels"),
+            false => (Some(session.noise as f32), 1, "a pixel"),
+        };
+        let error = error.unwrap_or(f32::INFINITY);
+        let percent = match error.is_finite() {
+            true => format!("about {:.1} % relative error in {of}", 100.0 * error),
+            false => "how far it is off is not known yet".to_owned(),
+        };
+        let grade = GRADES.iter().find(|(.., most)| error <= most[column]);
+        if let Some((text, color, hint, _)) = grade {
+            word(ui, text, *color, &format!("{hint}: {percent}"));
+        }
+    }
+    number(
+        ui,
+        &theme::samples(snapshot.mean_samples()),
+        "samples",
+        "Mean samples per pixel, of cached light too",
+    );
+    if !status.hides_clock {
         number(
             ui,
             &theme::clock(snapshot.seconds()),
@@ -128,45 +157,12 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             number(ui, &theme::figure(rate), "rays/s", hint);
         }
     }
-    if let Some(backdrop) = &snapshot.backdrop {
-        let share = backdrop.share(session.samples);
-        let told = match backdrop.origin {
-            Origin::Cache => Some((
-                "cached light",
-                "Share of cached light in the picture: free of noise at once, a few percent off, replaced as samples arrive, never saved",
-            )),
-            Origin::Before => None,
-        };
-        if let Some((unit, hint)) = told.filter(|_| share > 0.0) {
-            number(ui, &format!("{:.0} %", 100.0 * share), unit, hint);
-        }
-    }
-    if session.noise.is_finite() {
-        let (is_more, hint) = match session.samples < FEW {
-            true => (
-                "> ",
-                "Lower bound of the relative RMS error (few samples may have missed bright light)",
-            ),
-            false => ("", "Estimated relative RMS error of the pixels, before denoising"),
-        };
-        let percent = format!("{is_more}{:.1} %", 100.0 * session.noise);
-        number(ui, &percent, "noise", hint);
-    }
     let invalid = session.invalid_samples;
     if invalid > 0 {
         let text = RichText::new(format!("{} not finite", theme::count(invalid)));
         ui.label(text.color(theme::ALERT))
             .on_hover_text("Samples that were NaN or infinite; they count as black");
     }
-    // There is no room for what says least.
-    if theme::is_small(ui) {
-        return;
-    }
-    let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
-    let map = snapshot.request.environment.memory_bytes();
-    let [grid, table, pixels] = [grid, map.table, map.pixels].map(theme::bytes);
-    let hint = format!("Light Grid {grid}, importance table {table}, map {pixels}");
-    number(ui, &grid, "grid", &hint);
 }
 
 /// What the film holds under the pointer.

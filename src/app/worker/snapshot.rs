@@ -170,15 +170,6 @@ pub(crate) enum Origin {
     Before,
 }
 
-impl Backdrop {
-    /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
-    /// many samples a pixel.
-    pub(crate) fn share(&self, samples: u32) -> f32 {
-        let own = self.worth * self.samples as f32 / self.film.pixels().len().max(1) as f32;
-        if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
-    }
-}
-
 impl Snapshot {
     /// Samples a pixel of the picture by now, in the mean, of cached light too.
     pub(crate) fn mean_samples(&self) -> f64 {
