@@ -211,8 +211,9 @@ impl Drop for Owned {
     }
 }
 
-/// Denoises radiance, guided by albedo and normals if there are layers.
-pub(super) fn denoise(samples: &Samples<'_>) -> Result<Image> {
+/// Denoises radiance, guided by albedo and normals if there are layers; if it `prefilters`, noise is first taken out of
+/// these, too.
+pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> {
     let library = library()?;
     let new_device = function::<NewDevice>(library, "oidnNewDevice")?;
     let commit_device = function::<OfHandle>(library, "oidnCommitDevice")?;
@@ -243,26 +244,38 @@ pub(super) fn denoise(samples: &Samples<'_>) -> Result<Image> {
             return Err(failure(&get_error, null_mut()));
         }
         commit_device(device.handle);
-        let filter = Owned {
-            handle: new_filter(device.handle, c"RT".as_ptr()),
-            release: function(library, "oidnReleaseFilter")?,
+        let run = |images: &[(&CStr, *mut c_void)], flags: &[&CStr]| {
+            let filter = Owned {
+                handle: new_filter(device.handle, c"RT".as_ptr()),
+                release: function(library, "oidnReleaseFilter")?,
+            };
+            if filter.handle.is_null() {
+                return Err(failure(&get_error, device.handle));
+            }
+            for (name, at) in images {
+                let (name, format) = (name.as_ptr(), FORMAT_FLOAT3);
+                set_image(filter.handle, name, *at, format, size.0, size.1, 0, 0, 0);
+            }
+            flags.iter().for_each(|flag| set_bool(filter.handle, flag.as_ptr(), true));
+            commit_filter(filter.handle);
+            execute(filter.handle);
+            Ok(())
         };
-        if filter.handle.is_null() {
-            return Err(failure(&get_error, device.handle));
+        let mut images: Vec<(&CStr, *mut c_void)> =
+            vec![(c"color", color.pixels.as_mut_ptr().cast())];
+        let mut flags = vec![c"hdr"];
+        if let Some(layers) = &mut layers {
+            for (name, layer) in [c"albedo", c"normal"].into_iter().zip(layers) {
+                let at = layer.as_mut_ptr().cast();
+                if prefilters {
+                    run(&[(name, at), (c"output", at)], &[])?;
+                }
+                images.push((name, at));
+            }
+            flags.extend(prefilters.then_some(c"cleanAux"));
         }
-        let give = |name: &CStr, pixels: &mut [[f32; 3]]| {
-            let (at, format) = (pixels.as_mut_ptr().cast(), FORMAT_FLOAT3);
-            set_image(filter.handle, name.as_ptr(), at, format, size.0, size.1, 0, 0, 0);
-        };
-        give(c"color", &mut color.pixels);
-        if let Some([albedo, normal]) = &mut layers {
-            give(c"albedo", albedo);
-            give(c"normal", normal);
-        }
-        give(c"output", &mut output.pixels);
-        set_bool(filter.handle, c"hdr".as_ptr(), true);
-        commit_filter(filter.handle);
-        execute(filter.handle);
+        images.push((c"output", output.pixels.as_mut_ptr().cast()));
+        run(&images, &flags)?;
         let mut message = null();
         if get_error(device.handle, &raw mut message) != 0 {
             return Err(sentence(message));

@@ -244,7 +244,7 @@ fn balanced(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
 /// The film's picture, without noise if that is asked for.
 fn shown(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
     Ok(match (options.filter_of(film), options.denoiser) {
-        (Some(filter), _) => filter.denoise(&film.without_gaps(), cached)?,
+        (Some(filter), _) => filter.finish(&film.without_gaps(), cached)?,
         (None, Some(_)) => blend(film, None),
         (None, None) => film.without_gaps().image(),
     })

@@ -138,7 +138,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("bvh", 1352),
     ("cli", 3505),
     ("color", 25),
-    ("denoise", 1335),
+    ("denoise", 1355),
     ("develop", 468),
     ("digest", 91),
     ("environment", 1923),
