@@ -55,7 +55,8 @@ pub(crate) fn block_errors(exact: &Film, cached: Option<&Film>) -> Option<BlockE
     };
     let means: Vec<_> = (0..size[0] * size[1]).into_par_iter().map(of_block).collect();
     let brightness = means.iter().map(|[exact, _]| exact[0]).sum::<f64>() / means.len() as f64;
-    // Of each block the exact film's noise, the other's, and what is left of the difference: the cache's own error.
+    // A block's variance in the exact film, in the other one, and the cache's squared error: the squared difference
+    // of both means less both variances.
     let of_means = |[[exact, noise], [other, other_noise]]: &[[f64; 2]; 2]| {
         let scale = (0.5 * (exact + other)).powi(2) + (0.05 * brightness).powi(2);
         let error = (exact - other).powi(2) - noise - other_noise;

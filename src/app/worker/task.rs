@@ -13,8 +13,7 @@ use super::sessions::Sessions;
 use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
-use crate::render::block_errors::block_errors;
-use crate::render::cached_picture::{CachedPicture, suits, view, worth};
+use crate::render::cached_picture::{CachedPicture, suits, view};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Phase, Sampling, Session, StopRule, View, cut_off_notice};
@@ -268,10 +267,9 @@ impl<'a> PictureTask<'a> {
             self.sessions.keep_training(&mut cached.session);
         }
         // The film that says more is seen until the next picture does.
-        let film = cached.as_ref().and_then(CachedPicture::film_so_far);
-        if let Some(film) = film.filter(|_| main.samples() > 0) {
-            let errors = block_errors(main.film(), Some(film));
-            self.keep_earlier(Cow::Borrowed(film), worth(main.film(), film, errors.as_ref()));
+        let shown = cached.as_ref().filter(|_| main.samples() > 0);
+        if let Some((film, worth)) = shown.and_then(|cached| cached.film_beside(main.film())) {
+            self.keep_earlier(Cow::Borrowed(film), worth);
         }
         let mut left = SuspendedPicture {
             request: Arc::clone(self.request()),

@@ -8,8 +8,7 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::memory;
 use crate::path::World;
-use crate::render::block_errors::block_errors;
-use crate::render::cached_picture::{CachedPicture, suits, worth};
+use crate::render::cached_picture::{CachedPicture, suits};
 use crate::render::film::Film;
 use crate::render::{Driver, Sampling, Session, StopRule, View};
 
@@ -68,8 +67,8 @@ impl<'a> Beside<'a> {
     /// As [`Session::advance`].
     pub(super) fn advance(&mut self, driver: &mut Driver<'_>, cancel: &AtomicBool) -> Result<bool> {
         let main = &driver.session;
-        let is_met = driver.rule.samples.is_some_and(|limit| main.samples() >= limit);
-        let is_done = is_met && !self.wants_exact;
+        let is_done =
+            !self.wants_exact && driver.rule.samples.is_some_and(|limit| main.samples() >= limit);
         let may_go_on = self.is_wanted
             && !main.is_on_gpu()
             && main.samples() > 0
@@ -100,8 +99,6 @@ impl<'a> Beside<'a> {
 
     /// The film by cached light, and what one of its samples counts beside one of the exact `film`.
     pub(super) fn film(&self, film: &Film) -> Option<(&Film, f32)> {
-        let cached = self.picture.as_ref()?.film_so_far()?;
-        let errors = block_errors(film, Some(cached));
-        Some((cached, worth(film, cached, errors.as_ref())))
+        self.picture.as_ref()?.film_beside(film)
     }
 }
