@@ -24,7 +24,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("denoise");
     group.sample_size(10).throughput(Throughput::Elements(u64::from(size[0] * size[1])));
     group.bench_function("à-trous, pixels", |b| {
-        b.iter(|| black_box(Denoiser::ATrous.denoise(film, None)));
+        b.iter(|| black_box(Denoiser::ATrous.finish(film, None)));
     });
     group.finish();
 }

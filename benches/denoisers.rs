@@ -54,7 +54,7 @@ pub(crate) fn report() {
             for (filter, line) in filters.iter().zip(&mut lines) {
                 let picture = match filter {
                     None => Ok(session.film().image()),
-                    Some(filter) => filter.denoise(session.film(), None),
+                    Some(filter) => filter.finish(session.film(), None),
                 };
                 line.push_str(&differences(&picture.expect("it is usable"), &reference));
             }

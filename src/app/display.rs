@@ -70,7 +70,7 @@ impl Display {
             developer: Arc::clone(&self.screen.developer),
             snapshot: Arc::clone(snapshot),
             ahead: latest.filter(|latest| latest.moving && latest.view != snapshot.request.view),
-            denoiser: look.denoise.then_some(look.denoiser),
+            denoiser: look.denoise.then(|| look.denoiser.found()),
             metered: look.auto_exposure.then_some(look.white_balance),
             overlay: interface.overlay,
             look: interface.overlay.filter(|o| o.is_developed()).map(|_| *look),

@@ -360,7 +360,7 @@ fn frame(viewpoint: &mut Option<Viewpoint>, bounds: Option<(Vec3, Vec3)>, aspect
 /// How a picture was made, in a line.
 fn summary(snapshot: &Snapshot, document: &Document) -> String {
     let main = &snapshot.main;
-    let cached = snapshot.cached_film().map_or(0, |cached| cached.film.min_samples());
+    let cached = snapshot.backdrop.as_ref().map_or(0, |cached| cached.film.min_samples());
     let samples = match main.film.min_samples() + cached {
         0 => format!("{} samples", theme::samples(main.mean_samples())),
         1 => "1 sample".to_owned(),

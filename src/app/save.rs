@@ -104,7 +104,7 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
         ..PictureOptions::default()
     };
     // As it is shown. RGB of linear pictures is exact.
-    let cached = snapshot.cached_film().map(|cached| (&*cached.film, cached.worth));
+    let cached = snapshot.backdrop.as_ref().map(|cached| (&*cached.film, cached.worth));
     write_picture(path, &options, Films { film: record.film, cached }, record.metadata())
 }
 

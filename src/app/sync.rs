@@ -197,7 +197,7 @@ impl App {
         let Some(shown) = self.display.shown.as_deref() else { return };
         if let Some(failure) = shown.failure.clone() {
             self.messages.error(failure);
-            self.edited.amend(|document| document.look.denoiser = Denoiser::default());
+            self.edited.amend(|document| document.look.denoiser = Denoiser::ATrous);
         }
         // Said once: what cannot be compared is compared no longer.
         let compared = Comparison::new(self.interface.compared, &self.library.history);

@@ -97,7 +97,7 @@ impl PictureArguments {
     /// What takes noise out, where something does.
     fn denoiser(&self) -> Option<Denoiser> {
         match self.denoise {
-            None | Some(Denoise::Best) => Some(Denoiser::best()),
+            None | Some(Denoise::Best) => Some(Denoiser::Best),
             Some(Denoise::ATrous) => Some(Denoiser::ATrous),
             Some(Denoise::Oidn) => Some(Denoiser::Oidn),
             Some(Denoise::Off) => None,
@@ -136,7 +136,7 @@ impl PictureArguments {
         }
         let is_found = self.denoise != Some(Denoise::Oidn)
             && self.is_denoised(pictures)
-            && self.denoiser() == Some(Denoiser::Oidn);
+            && self.denoiser().map(Denoiser::found) == Some(Denoiser::Oidn);
         if is_found {
             notice("Open Image Denoise takes out the noise (--denoise off keeps it)");
         }

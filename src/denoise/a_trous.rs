@@ -7,6 +7,8 @@
 //! Denoising using Feature and Color Information*, 2013, do). A pixel on an edge finds no like: its light is
 //! then told by the guides of those around it ([`super::edges`]). Biased: for looking, not for measuring.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -40,14 +42,17 @@ const QUARTER: usize = 7;
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 
 /// The picture of films with layers, filtered.
-pub(super) fn denoise(samples: &Samples<'_>) -> Image {
+pub(super) fn denoise(samples: &Samples<'_>, cancel: &AtomicBool) -> Option<Image> {
     let guides = Guides::of(samples);
     let mut light = Light::of(samples, &guides);
     let support = share_errors(&mut light, &guides, samples);
     for step in STEPS {
+        if cancel.load(Ordering::Relaxed) {
+            return None;
+        }
         light = filtered(&light, &guides, step as isize);
     }
-    edges::mended(samples, &guides, &light, &support)
+    Some(edges::mended(samples, &guides, &light, &support))
 }
 
 /// What the pixels around one know, each in proportion to its likeness.

@@ -5,6 +5,7 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use libloading::{Library, Symbol};
 
@@ -40,6 +41,11 @@ const LOADER_PATH: &str = if cfg!(windows) {
 const DEVICE_TYPE_CPU: c_int = 1;
 /// `OIDN_FORMAT_FLOAT3`.
 const FORMAT_FLOAT3: c_int = 3;
+/// `OIDN_ERROR_CANCELLED`.
+const ERROR_CANCELLED: c_int = 6;
+/// `OIDN_QUALITY_FAST`, which versions from this one on know.
+const QUALITY_FAST: c_int = 4;
+const FAST_SINCE: c_int = 20300;
 
 type Handle = *mut c_void;
 type NewDevice = unsafe extern "C" fn(c_int) -> Handle;
@@ -57,6 +63,10 @@ type SetImage = unsafe extern "C" fn(
     usize,
 );
 type SetBool = unsafe extern "C" fn(Handle, *const c_char, bool);
+type SetInt = unsafe extern "C" fn(Handle, *const c_char, c_int);
+type Progress = unsafe extern "C" fn(*mut c_void, f64) -> bool;
+type SetProgress = unsafe extern "C" fn(Handle, Progress, *mut c_void);
+type GetInt = unsafe extern "C" fn(Handle, *const c_char) -> c_int;
 type GetError = unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int;
 
 /// The library, if this machine has it; loaded once and for good.
@@ -198,6 +208,16 @@ fn function<T>(library: &'static Library, name: &str) -> Result<Symbol<'static, 
         .map_err(|e| Error::new(format!("Open Image Denoise lacks {name}: {e}")))
 }
 
+/// Time for which noise is taken out, the least first.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quality {
+    /// By the smaller network, where the version has it.
+    Fast,
+    High,
+    /// Of albedo and normals first.
+    Prefiltered,
+}
+
 /// A device or a filter, released when dropped.
 struct Owned {
     handle: Handle,
@@ -211,9 +231,13 @@ impl Drop for Owned {
     }
 }
 
-/// Denoises radiance, guided by albedo and normals if there are layers; if it `prefilters`, noise is first taken out of
-/// these, too.
-pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> {
+/// Denoises radiance, guided by albedo and normals if there are layers, on as many threads as the caller has; `None` if
+/// `cancel` is set meanwhile.
+pub(super) fn denoise(
+    samples: &Samples<'_>,
+    quality: Quality,
+    cancel: &AtomicBool,
+) -> Result<Option<Image>> {
     let library = library()?;
     let new_device = function::<NewDevice>(library, "oidnNewDevice")?;
     let commit_device = function::<OfHandle>(library, "oidnCommitDevice")?;
@@ -223,6 +247,13 @@ pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> 
     let set_image = function::<SetImage>(library, "oidnSetSharedFilterImage")?;
     let set_bool = function::<SetBool>(library, "oidnSetFilterBool")
         .or_else(|_| function::<SetBool>(library, "oidnSetFilter1b"))?;
+    let set_int = function::<SetInt>(library, "oidnSetFilterInt")
+        .or_else(|_| function::<SetInt>(library, "oidnSetFilter1i"))?;
+    let set_device_int = function::<SetInt>(library, "oidnSetDeviceInt")
+        .or_else(|_| function::<SetInt>(library, "oidnSetDevice1i"))?;
+    let set_progress = function::<SetProgress>(library, "oidnSetFilterProgressMonitorFunction")?;
+    let device_int = function::<GetInt>(library, "oidnGetDeviceInt")
+        .or_else(|_| function::<GetInt>(library, "oidnGetDevice1i"))?;
     let get_error = function::<GetError>(library, "oidnGetDeviceError")?;
 
     let mut color = samples.image();
@@ -243,7 +274,11 @@ pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> 
         if device.handle.is_null() {
             return Err(failure(&get_error, null_mut()));
         }
+        let threads = rayon::current_num_threads();
+        set_device_int(device.handle, c"numThreads".as_ptr(), threads as c_int);
         commit_device(device.handle);
+        let is_fast = quality == Quality::Fast
+            && device_int(device.handle, c"version".as_ptr()) >= FAST_SINCE;
         let run = |images: &[(&CStr, *mut c_void)], flags: &[&CStr]| {
             let filter = Owned {
                 handle: new_filter(device.handle, c"RT".as_ptr()),
@@ -257,6 +292,10 @@ pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> 
                 set_image(filter.handle, name, *at, format, size.0, size.1, 0, 0, 0);
             }
             flags.iter().for_each(|flag| set_bool(filter.handle, flag.as_ptr(), true));
+            if is_fast {
+                set_int(filter.handle, c"quality".as_ptr(), QUALITY_FAST);
+            }
+            set_progress(filter.handle, goes_on, (&raw const *cancel).cast_mut().cast());
             commit_filter(filter.handle);
             execute(filter.handle);
             Ok(())
@@ -267,21 +306,31 @@ pub(super) fn denoise(samples: &Samples<'_>, prefilters: bool) -> Result<Image> 
         if let Some(layers) = &mut layers {
             for (name, layer) in [c"albedo", c"normal"].into_iter().zip(layers) {
                 let at = layer.as_mut_ptr().cast();
-                if prefilters {
+                if quality == Quality::Prefiltered {
                     run(&[(name, at), (c"output", at)], &[])?;
                 }
                 images.push((name, at));
             }
-            flags.extend(prefilters.then_some(c"cleanAux"));
+            flags.extend((quality == Quality::Prefiltered).then_some(c"cleanAux"));
         }
         images.push((c"output", output.pixels.as_mut_ptr().cast()));
         run(&images, &flags)?;
         let mut message = null();
-        if get_error(device.handle, &raw mut message) != 0 {
-            return Err(sentence(message));
+        match get_error(device.handle, &raw mut message) {
+            0 => Ok(Some(output)),
+            ERROR_CANCELLED => Ok(None),
+            _ => Err(sentence(message)),
         }
     }
-    Ok(output)
+}
+
+/// Whether a filter goes on: its progress does not matter.
+///
+/// # Safety
+/// `cancel` points to an [`AtomicBool`].
+unsafe extern "C" fn goes_on(cancel: *mut c_void, _progress: f64) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { !(*cancel.cast::<AtomicBool>()).load(Ordering::Relaxed) }
 }
 
 fn failure(get_error: &Symbol<'static, GetError>, device: Handle) -> Error {

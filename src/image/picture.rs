@@ -57,6 +57,13 @@ impl Image {
         })
     }
 
+    /// The picture in smaller pixels, `times` of which are as wide as one of its own, cut to a size.
+    pub(crate) fn enlarged(&self, times: u32, [width, height]: [u32; 2]) -> Self {
+        let place = |at: u32| (at as f32 + 0.5) / times as f32 - 0.5;
+        let row = |y: u32| (0..width).map(move |x| self.between([place(x), place(y)]));
+        Self { width, height, pixels: (0..height).flat_map(row).collect() }
+    }
+
     /// The colour at a place in pixels, whole numbers being their middles: between the four around it.
     pub(crate) fn between(&self, place: [f32; 2]) -> [f32; 3] {
         let size = [self.width, self.height];

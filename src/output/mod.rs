@@ -7,7 +7,7 @@ pub mod film_file;
 pub mod record;
 
 use crate::color::luminance;
-use crate::denoise::{Denoiser, blend};
+use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::{
@@ -213,7 +213,7 @@ pub fn write_picture(
 
 /// What takes the noise out, and what helps.
 fn filter_metadata(options: &PictureOptions, films: Films<'_>) -> Vec<(String, String)> {
-    let Some(filter) = options.filter_of(films.film) else { return Vec::new() };
+    let Some(filter) = options.denoiser else { return Vec::new() };
     let cached = films.cached.map(|(cached, _)| {
         ("lightgrid.cached_samples_per_pixel".to_owned(), cached.min_samples().to_string())
     });
@@ -243,11 +243,10 @@ fn balanced(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
 
 /// The film's picture, without noise if that is asked for.
 fn shown(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
-    Ok(match (options.filter_of(film), options.denoiser) {
-        (Some(filter), _) => filter.finish(&film.without_gaps(), cached)?,
-        (None, Some(_)) => blend(film, None),
-        (None, None) => film.without_gaps().image(),
-    })
+    match options.denoiser {
+        Some(filter) => filter.finish(film, cached),
+        None => Ok(film.without_gaps().image()),
+    }
 }
 
 /// What surfaces show in pixels that they cover in part.
@@ -263,13 +262,6 @@ fn alpha_of(whole: &Film, metadata: &[(String, String)]) -> Option<Vec<f32>> {
     let is_transparent =
         metadata.iter().any(|(key, value)| key == "lightgrid.background" && value == "none");
     is_transparent.then(|| whole.alpha())?
-}
-
-impl PictureOptions {
-    /// What takes noise out of a film: filters would take the copies that fill gaps for samples that agree.
-    fn filter_of(&self, film: &Film) -> Option<Denoiser> {
-        self.denoiser.filter(|_| film.min_samples() > 0)
-    }
 }
 
 /// What surfaces look like is that of the film without gaps.

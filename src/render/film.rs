@@ -63,6 +63,14 @@ impl Pixel {
         self.invalid += u32::from(result.was_invalid);
     }
 
+    /// Adds all samples of another one.
+    pub(super) fn add_all(&mut self, other: &Self) {
+        self.sum.iter_mut().zip(other.sum).for_each(|(sum, more)| *sum += more);
+        self.luminance_squared += other.luminance_squared;
+        self.samples = self.samples.saturating_add(other.samples);
+        self.invalid = self.invalid.saturating_add(other.invalid);
+    }
+
     /// Of sums over `samples` samples: red, green, blue and squared luminance.
     pub(crate) fn of_sums(
         [r, g, b, luminance_squared]: [f64; 4],
@@ -136,6 +144,14 @@ impl Surface {
         }
     }
 
+    /// Adds what all samples of another one met.
+    pub(super) fn add_all(&mut self, other: &Self) {
+        self.albedo += other.albedo;
+        self.normal += other.normal;
+        self.depth += other.depth;
+        self.hits += other.hits;
+    }
+
     /// Of sums over first hits: albedo, depth, normal and their number.
     pub(crate) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
         Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits }
@@ -194,7 +210,17 @@ impl Film {
 
     /// Whether all pixels have a sample that a film begins with.
     pub(crate) fn is_begun(&self) -> bool {
-        let every = BEGINNINGS[0] as usize;
+        self.has_every(BEGINNINGS[0])
+    }
+
+    /// Along how many pixels a larger one is whose like all have a sample, of the sizes that a film begins with.
+    pub(crate) fn whole_pixels(&self) -> Option<u32> {
+        [1].into_iter().chain(BEGINNINGS.into_iter().rev()).find(|every| self.has_every(*every))
+    }
+
+    /// Whether every so-manyth pixel of every so-manyth row has a sample.
+    fn has_every(&self, every: u32) -> bool {
+        let every = every as usize;
         let rows = self.pixels.chunks(self.width.max(1) as usize).step_by(every);
         !self.pixels.is_empty()
             && rows.flat_map(|row| row.iter().step_by(every)).all(|pixel| pixel.samples > 0)
@@ -231,18 +257,8 @@ impl Film {
     /// Adds the samples of another film of the same size and with the same layers: each counts as much
     /// as any of this one's.
     pub(crate) fn add_film(&mut self, other: &Self) {
-        for (pixel, more) in self.pixels.iter_mut().zip(&other.pixels) {
-            pixel.sum.iter_mut().zip(more.sum).for_each(|(sum, more)| *sum += more);
-            pixel.luminance_squared += more.luminance_squared;
-            pixel.samples = pixel.samples.saturating_add(more.samples);
-            pixel.invalid = pixel.invalid.saturating_add(more.invalid);
-        }
-        for (surface, more) in self.surfaces.iter_mut().zip(&other.surfaces) {
-            surface.albedo += more.albedo;
-            surface.normal += more.normal;
-            surface.depth += more.depth;
-            surface.hits += more.hits;
-        }
+        self.pixels.iter_mut().zip(&other.pixels).for_each(|(pixel, more)| pixel.add_all(more));
+        self.surfaces.iter_mut().zip(&other.surfaces).for_each(|(all, more)| all.add_all(more));
     }
 
     /// Adds one sample to the pixel in column `x` of row `y`.

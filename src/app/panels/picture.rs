@@ -48,14 +48,20 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
         }
         // The library is looked for once.
         if let Err(missing) = Denoiser::Oidn.check() {
-            ui.weak("built-in filter").on_hover_text(format!("Intel's Open Image Denoise gives smoother pictures. {missing}. Restart lightgrid to choose it here"));
+            ui.weak("built-in filter").on_hover_text(format!("Intel's Open Image Denoise gives smoother pictures. {missing}. Restart lightgrid to use it"));
             return;
         }
         let chosen = &mut document.look.denoiser;
-        ui.selectable_value(chosen, Denoiser::ATrous, "À-trous")
-            .on_hover_text("Built-in edge-avoiding filter: fast");
-        ui.selectable_value(chosen, Denoiser::Oidn, "Open Image Denoise")
-            .on_hover_text("Intel's neural denoiser, found on this machine: slower, smoother");
+        let name = |denoiser: Denoiser| match denoiser.found() {
+            Denoiser::ATrous => "À-trous",
+            _ => "Open Image Denoise",
+        };
+        let choice = theme::choice(ui, "denoiser").selected_text(name(*chosen)).show_ui(ui, |ui| {
+            for denoiser in [Denoiser::Best, Denoiser::ATrous] {
+                ui.selectable_value(chosen, denoiser, name(denoiser));
+            }
+        });
+        choice.response.on_hover_text("Intel's neural denoiser, or the built-in edge-avoiding filter");
     });
 }
 

@@ -20,7 +20,8 @@ const WORTH: f64 = 4.0;
 const MAX_WORTH: f64 = 64.0;
 /// Pixels along an edge of the blocks whose light is compared.
 const BLOCK: usize = 16;
-/// By what share of their light blocks may differ before what is carried counts less, and where it counts nothing.
+/// By what share of their light blocks may differ before what is carried counts less, and where it counts nothing, once
+/// pixels have a sample. With fewer samples noise alone makes larger differences.
 const DIFFERENCES: [f32; 2] = [0.06, 0.2];
 
 /// The last whole picture, and that of the view before, which it takes the place of.
@@ -118,7 +119,7 @@ impl Carried {
                 return own;
             }
             let seen = whole.keyframe.seen_in(view, Some(film));
-            faded(&seen, image, (samples / worth) as f32)
+            faded(&seen, image, samples as f32, worth as f32)
         };
         Prepared {
             is_carried: true,
@@ -147,23 +148,25 @@ fn under(seen: &[Option<[f32; 3]>], small: &Image, [width, height]: [u32; 2]) ->
     Image { width, height, pixels }
 }
 
-/// The mean of a picture and of what is seen, where both agree. The picture has `times` the weight.
-fn faded(seen: &[Option<[f32; 3]>], own: &Image, times: f32) -> Image {
-    let agreement = agreement(seen, own);
+/// The mean of a picture of so many `samples` and of what is seen, which is worth as many as that, where both agree.
+fn faded(seen: &[Option<[f32; 3]>], own: &Image, samples: f32, worth: f32) -> Image {
+    let noise = samples.min(1.0).sqrt().recip();
+    let agreement = agreement(seen, own, DIFFERENCES.map(|difference| noise * difference));
     let color = |((at, seen), own_): ((usize, &Option<[f32; 3]>), &[f32; 3])| {
         let Some(seen) = seen else { return *own_ };
         let place = [at % own.width as usize, at / own.width as usize];
         let in_blocks = place.map(|place| (place as f32 + 0.5) / BLOCK as f32 - 0.5);
-        let worth = agreement.between(in_blocks)[0];
-        let share = if worth > 0.0 { worth / (worth + times) } else { 0.0 };
+        let worth = worth * agreement.between(in_blocks)[0];
+        let share = if worth > 0.0 { worth / (worth + samples) } else { 0.0 };
         std::array::from_fn(|i| own_[i] + share * (seen[i] - own_[i]))
     };
     let pixels = seen.par_iter().enumerate().zip(&own.pixels).map(color).collect();
     Image { width: own.width, height: own.height, pixels }
 }
 
-/// How far blocks of a picture agree with what is seen there, 0 to 1 in all channels.
-fn agreement(seen: &[Option<[f32; 3]>], own: &Image) -> Image {
+/// How far blocks of a picture agree with what is seen there, 0 to 1 in all channels: 1 up to the first of two relative
+/// differences, 0 from the second on.
+fn agreement(seen: &[Option<[f32; 3]>], own: &Image, [least, most]: [f32; 2]) -> Image {
     let (width, height) = (own.width as usize, own.height as usize);
     let count = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
     let of_block = |block: usize| {
@@ -180,7 +183,6 @@ fn agreement(seen: &[Option<[f32; 3]>], own: &Image) -> Image {
         }
         // Where nothing is seen, blocks beside this one count less.
         let difference = if lights > 0.0 { apart.abs() / lights } else { 1.0 };
-        let [least, most] = DIFFERENCES;
         [1.0 - ((difference - least) / (most - least)).clamp(0.0, 1.0); 3]
     };
     let pixels = (0..count[0] * count[1]).into_par_iter().map(of_block).collect();

@@ -1,9 +1,11 @@
 //! What the presenter keeps from one order to the next.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::carried::Carried;
 use super::order::{Order, Shown};
+use super::recent::Recent;
 use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
@@ -27,12 +29,16 @@ impl<K, V> Default for Last<K, V> {
 
 impl<K: PartialEq, V: Clone> Last<K, V> {
     fn or_make(&mut self, key: K, make: impl FnOnce() -> Result<V>) -> Result<V> {
-        if let Some((_, value)) = self.0.as_ref().filter(|(last, _)| *last == key) {
-            return Ok(value.clone());
+        self.or_try(key, || make().map(Some)).map(|made| made.expect("it was made"))
+    }
+
+    /// The same where nothing may be made.
+    fn or_try(&mut self, key: K, make: impl FnOnce() -> Result<Option<V>>) -> Result<Option<V>> {
+        if self.0.as_ref().is_none_or(|(last, _)| *last != key) {
+            let Some(value) = make()? else { return Ok(None) };
+            self.0 = Some((key, value));
         }
-        let value = make()?;
-        self.0 = Some((key, value.clone()));
-        Ok(value)
+        Ok(self.0.as_ref().map(|(_, value)| value.clone()))
     }
 }
 
@@ -52,6 +58,9 @@ pub(super) struct Memory {
     surfaces: Option<(Arc<Request>, SurfaceMap)>,
     facts: Option<(Arc<LightGrid>, bool, Arc<CellFacts>)>,
     carried: Carried,
+    /// The last view of a movement; how many pixels wide its picture was, and of how many samples.
+    moved: Option<(Arc<Request>, u32, u64)>,
+    recent: Recent,
     uploads: Uploads,
 }
 
@@ -81,21 +90,35 @@ struct Painted {
 }
 
 impl Memory {
-    /// Fails only if the device does.
-    pub(super) fn present(&mut self, order: &Order) -> Result<Shown> {
+    /// Fails only if the device does; `None` if it was cancelled, or what is shown is better.
+    pub(super) fn present(&mut self, order: &Order, cancel: &AtomicBool) -> Result<Option<Shown>> {
         let developer = Arc::clone(&order.developer);
         if self.uploads.developer.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &developer)) {
             let developer = Some(Arc::clone(&developer));
             self.uploads = Uploads { developer, ..Uploads::default() };
         }
         self.leave_what_is_not_in(order);
+        if order.latest().moving {
+            let film = &order.snapshot.main.film;
+            self.moved = Some((Arc::clone(order.latest()), film.width, film.total_samples()));
+        } else if self.is_coarse(&order.snapshot) {
+            return Ok(None);
+        }
         let source = Source::main(order);
-        let prepare = || Ok(source.prepare(&developer));
-        let own = self.uploads.picture.or_make(source.key(), prepare)?;
+        let prepare = || match self.recent.come_back(order) {
+            Some(image) => Ok(Some(Prepared::of(&developer, Arc::clone(image)))),
+            None => Ok(source.prepare(&developer, cancel)),
+        };
+        let Some(own) = self.uploads.picture.or_try(source.key(), prepare)? else {
+            return Ok(None);
+        };
         let key = (source.key(), order.ahead.as_ref().map(|ahead| Arc::as_ptr(ahead) as usize));
         let complete = || Ok(self.carried.carry(order, own));
         let Prepared { mut picture, image, is_carried, mut failure } =
             self.uploads.completed.or_make(key, complete)?;
+        if let Some(image) = image.as_ref().filter(|_| order.snapshot.is_lasting() && !is_carried) {
+            self.recent.keep(order, image);
+        }
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(order) {
                 return Ok(ev);
@@ -141,15 +164,17 @@ impl Memory {
                 order.snapshot.is_whole() && size == (view.width, view.height)
             });
         } else if let Some(source) = Source::plain(order) {
-            let prepare = || Ok(source.prepare(&developer));
-            let plain = self.uploads.plain.or_make(source.key(), prepare)?;
+            let prepare = || Ok(source.prepare(&developer, cancel));
+            let Some(plain) = self.uploads.plain.or_try(source.key(), prepare)? else {
+                return Ok(None);
+            };
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
         developer.gpu().check()?;
         let (overlay, words) =
             painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
         let (legend, labels) = words.unzip();
-        Ok(Shown {
+        Ok(Some(Shown {
             order: order.presented(),
             picture,
             image,
@@ -162,7 +187,7 @@ impl Memory {
             legend,
             labels: labels.unwrap_or_default(),
             failure,
-        })
+        }))
     }
 
     /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or
@@ -176,8 +201,24 @@ impl Memory {
         is_alike.then_some(whole.ev)
     }
 
+    /// Whether a picture shows less yet than the last one of a movement that ended in its view: no smaller pixels, or
+    /// fewer samples.
+    fn is_coarse(&self, snapshot: &Snapshot) -> bool {
+        let (request, film) = (&snapshot.request, &snapshot.main.film);
+        let Some((moved, width, samples)) = &self.moved else { return false };
+        let films = || snapshot.backdrop.iter().map(|backdrop| &backdrop.film).chain([film]);
+        let every = films().filter_map(|film| film.whole_pixels()).min().unwrap_or(film.width);
+        let own: u64 = films().map(|film| film.total_samples()).sum();
+        every > 1
+            && moved.view.camera == request.view.camera
+            && moved.is_seen_like(request)
+            && (film.width / every <= *width || own < *samples)
+    }
+
     /// Lets go of what the order does not ask for: each holds a film, or a scene.
     fn leave_what_is_not_in(&mut self, order: &Order) {
+        let world = &order.snapshot.request.world;
+        self.moved.take_if(|(moved, ..)| !Arc::ptr_eq(&moved.world, world));
         if order.compared.is_none() {
             self.uploads.compared = Last::default();
         }

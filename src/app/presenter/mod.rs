@@ -4,11 +4,13 @@
 mod carried;
 mod memory;
 mod order;
+mod recent;
 mod rest;
 mod source;
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -30,6 +32,8 @@ pub(crate) struct Presenter {
     thread: LatestThread<Order>,
     shown: Arc<Mutex<Option<Arc<Shown>>>>,
     ordered: Option<Order>,
+    /// Set where the picture that is being made is no longer of what is asked for.
+    cancel: Arc<AtomicBool>,
 }
 
 impl Presenter {
@@ -45,11 +49,11 @@ impl Presenter {
             .thread_name(|i| format!("present {i}"))
             .build()
             .map_err(|e| Error::new(format!("the display threads cannot be started: {e}")))?;
-        let shown = Arc::default();
-        let inside = Arc::clone(&shown);
-        let work = move |orders: &_| pool.install(|| run(orders, &inside, &wake));
+        let (shown, cancel) = (Arc::default(), Arc::default());
+        let inside = (Arc::clone(&shown), Arc::clone(&cancel));
+        let work = move |orders: &_| pool.install(|| run(orders, &inside.0, &inside.1, &wake));
         let thread = LatestThread::start("presenter", Arc::default(), work)?;
-        Ok(Self { thread, shown, ordered: None })
+        Ok(Self { thread, shown, ordered: None, cancel })
     }
 
     /// Orders a picture; the latest order counts.
@@ -57,8 +61,13 @@ impl Presenter {
         if self.ordered.as_ref() == Some(&order) {
             return;
         }
-        self.ordered = Some(order.clone());
-        self.thread.latest.change(|slot| slot.value = Some(order));
+        let before = self.ordered.replace(order.clone());
+        self.thread.latest.change(|slot| {
+            if before.is_some_and(|before| !order.is_same_work(&before)) {
+                self.cancel.store(true, Ordering::Relaxed);
+            }
+            slot.value = Some(order);
+        });
     }
 
     /// What there is to show.
@@ -73,7 +82,12 @@ impl Presenter {
     }
 }
 
-fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
+fn run(
+    orders: &Latest<Order>,
+    shown: &Mutex<Option<Arc<Shown>>>,
+    cancel: &AtomicBool,
+    wake: &Wake,
+) {
     let mut memory = Memory::default();
     // The last order, and until when one that only follows it waits.
     let mut last: Option<(Order, Instant)> = None;
@@ -89,7 +103,10 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
                 (Some(_), _) => Duration::ZERO,
             };
             match rest.is_zero() {
-                true => ControlFlow::Break(slot.value.take()),
+                true => {
+                    cancel.store(false, Ordering::Relaxed);
+                    ControlFlow::Break(slot.value.take())
+                }
                 false => ControlFlow::Continue(Some(rest)),
             }
         })
@@ -98,10 +115,10 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
         let (start, kept) = (Instant::now(), order.presented());
         let work = Work::start();
         order.snapshot.rest.set_end(start + MAX_WAIT);
-        match catch_unwind(AssertUnwindSafe(|| memory.present(&order))) {
-            Ok(Ok(done)) => *lock(shown) = Some(Arc::new(done)),
-            // Where the device is lost, the window orders again on another.
-            Ok(Err(_)) => {}
+        match catch_unwind(AssertUnwindSafe(|| memory.present(&order, cancel))) {
+            Ok(Ok(Some(done))) => *lock(shown) = Some(Arc::new(done)),
+            // It was cancelled; or the device is lost, and the window orders again on another.
+            Ok(Ok(None) | Err(_)) => {}
             // The panic is on the terminal; the next picture is another try.
             Err(_) => memory = Memory::default(),
         }

@@ -1,6 +1,7 @@
 //! What is to be shown, and what there is to show.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::app::comparison::Comparison;
 use crate::app::document::Look;
@@ -71,8 +72,15 @@ impl Order {
     /// What is to be shown, made on the host.
     pub(in crate::app) fn image(&self) -> Image {
         let film = &self.snapshot.main.film;
-        let filtered = self.denoiser.and_then(|denoiser| denoiser.denoise(film, None).ok());
+        let never = AtomicBool::new(false);
+        let filtered = self.denoiser.and_then(|it| it.preview(film, None, &never).ok().flatten());
         filtered.unwrap_or_else(|| film.image())
+    }
+
+    /// Whether it is of the work of an order before it, or of the same movement.
+    pub(super) fn is_same_work(&self, before: &Self) -> bool {
+        let [request, old] = [self, before].map(|order| &order.snapshot.request);
+        Arc::ptr_eq(request, old) || (request.moving && old.moving)
     }
 
     /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
@@ -83,10 +91,11 @@ impl Order {
             |snapshot: &Snapshot| snapshot.plain.as_ref().is_some_and(|p| p.samples > 0);
         let (now, then) = (&self.snapshot, &before.snapshot);
         let is_first = now.is_whole() && !then.is_whole() || has_plain(now) && !has_plain(then);
-        let (request, old) = (&self.snapshot.request, &before.snapshot.request);
-        let is_same_work = Arc::ptr_eq(request, old) || (request.moving && old.moving);
         let snapshot = Arc::clone(&before.snapshot);
-        is_same_work && !is_over && !is_first && Self { snapshot, ..self.clone() } == *before
+        self.is_same_work(before)
+            && !is_over
+            && !is_first
+            && Self { snapshot, ..self.clone() } == *before
     }
 }
 

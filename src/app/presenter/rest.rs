@@ -4,19 +4,19 @@ use std::time::Duration;
 
 use crate::system::thread_cpu_time;
 
-/// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
-/// is much better than the last, and most after [`MAX_REST_AFTER`]. With all of the cores it then takes a
-/// seventeenth of the machine.
-const REST: [f64; 2] = [3.0, 16.0];
+/// After a picture of work that goes on it rests so many times as long as that took: little at first, when each is better
+/// than the last, and most at the end of [`SLOWING`]. Of the machine half of whose cores it has, it takes 15 and 3 %.
+const REST: [f64; 2] = [2.4, 16.0];
 /// Rest after a moving camera's picture, over the time that picture took: short, since eyes follow it.
 pub(super) const MOVING_REST: f64 = 0.5;
-/// Seconds of work on a view after which pictures change slowly.
-const MAX_REST_AFTER: f64 = 12.0;
+/// Seconds of work on a view while pictures change less and less.
+const SLOWING: [f64; 2] = [60.0, 240.0];
 
 /// For how long it rests after a picture that took so long, of so many seconds of work.
 pub(super) fn rest_after(took: Duration, seconds: f64) -> Duration {
-    let [least, most] = REST;
-    took.mul_f64(least + (most - least) * (seconds / MAX_REST_AFTER).clamp(0.0, 1.0))
+    let ([least, most], [start, end]) = (REST, SLOWING);
+    let slowed = ((seconds - start) / (end - start)).clamp(0.0, 1.0);
+    took.mul_f64(least + (most - least) * slowed)
 }
 
 /// What a picture took, for its rest. By the clock that would be far too long where other programs take the
@@ -49,7 +49,7 @@ mod tests {
         let seconds = Duration::from_secs_f64;
         assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
         assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
-        assert_eq!(rest_after(seconds(0.5), 0.0), seconds(1.5));
+        assert_eq!(rest_after(seconds(0.5), 60.0), seconds(1.2));
         assert_eq!(rest_after(seconds(0.5), 1e9), seconds(8.0));
     }
 }

@@ -1,10 +1,11 @@
 //! What a picture is made from, and how.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Weak};
 
 use super::order::Order;
-use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
-use crate::denoise::{Denoiser, blend};
+use crate::app::worker::{Backdrop, SessionSnapshot};
+use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 use crate::render::film::Film;
@@ -23,9 +24,10 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    pub(super) fn of(developer: &Developer, image: Image) -> Self {
+    pub(super) fn of(developer: &Developer, image: impl Into<Arc<Image>>) -> Self {
+        let image = image.into();
         let picture = developer.upload_image(&image);
-        Self { picture, image: Some(Arc::new(image)), is_carried: false, failure: None }
+        Self { picture, image: Some(image), is_carried: false, failure: None }
     }
 
     fn on_device(picture: LinearPicture) -> Self {
@@ -33,16 +35,8 @@ impl Prepared {
     }
 }
 
-/// A filtered picture is as good as the blend of so many times its samples.
-const FILTER_WORTH: u64 = 4;
-
-/// A sample of a smaller picture says as much as so many of pixels here and there.
-const DOTS_WORTH: u64 = 4;
-
-/// A whole picture of n samples a pixel is as good as a smaller one of so many times n times its own samples: in
-/// the office and the living room, at half the width, one sample as two to four, two as seven to twelve, and
-/// four as thirty, for what is small is blurred.
-const WHOLE_WORTH: f64 = 0.6;
+/// Until so many seconds were spent on a view, a device that filters by itself shows it at once.
+const YOUNG_SECONDS: f64 = 1.0;
 
 /// What a linear picture is made from.
 pub(super) struct Source {
@@ -57,7 +51,7 @@ pub(super) struct Source {
 #[derive(Clone)]
 pub(super) struct SourceKey {
     film: Weak<Film>,
-    backdrop: Option<(Weak<Film>, f32, Origin)>,
+    backdrop: Option<(Weak<Film>, f32)>,
     denoiser: Option<Denoiser>,
     is_whole: bool,
 }
@@ -65,9 +59,7 @@ pub(super) struct SourceKey {
 impl PartialEq for SourceKey {
     fn eq(&self, other: &Self) -> bool {
         let is_alike = match (&self.backdrop, &other.backdrop) {
-            (Some((film, worth, origin)), Some(other)) => {
-                film.ptr_eq(&other.0) && (*worth, *origin) == (other.1, other.2)
-            }
+            (Some((film, worth)), Some(other)) => film.ptr_eq(&other.0) && *worth == other.1,
             (own, other) => own.is_none() && other.is_none(),
         };
         is_alike
@@ -79,12 +71,12 @@ impl PartialEq for SourceKey {
 impl Source {
     pub(super) fn main(order: &Order) -> Self {
         let snapshot = &order.snapshot;
-        // Where there are no samples, the film is that from before.
-        let backdrop = snapshot.backdrop.clone();
-        let backdrop =
-            backdrop.filter(|backdrop| !Arc::ptr_eq(&backdrop.film, &snapshot.main.film));
-        let session = snapshot.main.clone();
-        Self { session, backdrop, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
+        let (session, backdrop) = (snapshot.main.clone(), snapshot.backdrop.clone());
+        let Film { width, height, .. } = *session.film;
+        let is_on_device =
+            snapshot.seconds() < YOUNG_SECONDS && order.developer.can_denoise(width, height);
+        let denoiser = order.denoiser.map(|it| if is_on_device { Denoiser::ATrous } else { it });
+        Self { session, backdrop, denoiser, is_whole: snapshot.is_whole() }
     }
 
     pub(super) fn plain(order: &Order) -> Option<Self> {
@@ -94,7 +86,7 @@ impl Source {
     }
 
     pub(super) fn key(&self) -> SourceKey {
-        let of_backdrop = |it: &Backdrop| (Arc::downgrade(&it.film), it.worth, it.origin);
+        let of_backdrop = |it: &Backdrop| (Arc::downgrade(&it.film), it.worth);
         SourceKey {
             film: Arc::downgrade(&self.session.film),
             backdrop: self.backdrop.as_ref().map(of_backdrop),
@@ -112,30 +104,8 @@ impl Source {
             && self.backdrop.as_ref().is_none_or(is_dark)
     }
 
-    /// Whether the film has too few samples to be seen in place of a smaller picture of this view. As long as
-    /// pixels have none, those that have one would be dots in it.
-    fn is_behind(&self, before: &Film) -> bool {
-        let film = &self.session.film;
-        let shape = |film: &Film| f64::from(film.width) / f64::from(film.height);
-        let is_alike = (shape(before) / shape(film) - 1.0).abs() < 0.05;
-        let [own, other] = [film, before].map(Film::total_samples);
-        before.width < film.width
-            && before.min_samples() > 0
-            && is_alike
-            && if self.is_whole {
-                let own = own as f64;
-                WHOLE_WORTH * own * (own / film.pixels().len() as f64) < other as f64
-            } else {
-                own < DOTS_WORTH * other
-            }
-    }
-
-    fn is_of(&self, origin: Origin) -> bool {
-        self.backdrop.as_ref().is_some_and(|backdrop| backdrop.origin == origin)
-    }
-
-    /// The picture on the device, without noise if that is asked for.
-    pub(super) fn prepare(&self, developer: &Developer) -> Prepared {
+    /// The picture on the device, without noise if that is asked for; `None` if that was cancelled.
+    pub(super) fn prepare(&self, developer: &Developer, cancel: &AtomicBool) -> Option<Prepared> {
         let film = &self.session.film;
         let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
         let noisy = |layers| match self.session.on_device.as_ref().filter(is_here) {
@@ -144,37 +114,23 @@ impl Source {
             }
             _ => developer.upload_film(film, layers),
         };
-        let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
-        let ahead = backdrop.filter(|(before, _)| self.is_behind(before));
-        let (film, backdrop) = ahead.map_or((&**film, backdrop), |(before, _)| (before, None));
-        let blended = || Prepared::of(developer, blend(film, backdrop));
-        // Filters take whole films of one size.
-        let has_all = film.min_samples() > 0;
-        let other = backdrop.filter(|(other, worth)| {
-            film.is_alike(other) && *worth > 0.0 && (has_all || other.min_samples() > 0)
-        });
-        let is_blended = other.is_some() && !self.is_of(Origin::Before);
-        let is_surpassed =
-            |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
-        let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));
-        match self.denoiser {
+        let other = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
+        let raw = || Prepared::of(developer, film.without_gaps().image());
+        Some(match self.denoiser {
             None if self.is_whole => Prepared::on_device(noisy(false)),
+            None => raw(),
             Some(Denoiser::ATrous)
                 if self.is_whole
-                    && ahead.is_none()
-                    && !is_blended
+                    && other.is_none()
                     && developer.can_denoise(film.width, film.height) =>
             {
                 Prepared::on_device(developer.denoised(&noisy(true)))
             }
-            // A picture with holes or in other pixels is there to see where one is going.
-            None => blended(),
-            Some(_) if !can_filter => blended(),
-            Some(denoiser) => match denoiser.denoise(film, other) {
-                Ok(image) => Prepared::of(developer, image),
-                Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
+            Some(denoiser) => match denoiser.preview(film, other, cancel) {
+                Ok(image) => Prepared::of(developer, image?),
+                Err(failure) => Prepared { failure: Some(failure.to_string()), ..raw() },
             },
-        }
+        })
     }
 }
 
@@ -226,28 +182,24 @@ pub(super) mod tests {
     #[test]
     fn a_cached_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
         let Some(developer) = developer() else { return };
+        let never = AtomicBool::new(false);
         let prepared = |own: Film, other: Film, is_whole| {
             let (samples, film) = (other.total_samples(), Arc::new(other));
-            let backdrop = Some(Backdrop { film, samples, worth: 4.0, origin: Origin::Cache });
+            let backdrop = Some(Backdrop { film, samples, worth: 4.0 });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
-            let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
+            let prepared =
+                Source { session, backdrop, denoiser, is_whole }.prepare(&developer, &never);
+            let prepared = prepared.expect("not cancelled");
             prepared.image.expect("made on the host").pixels.clone()
         };
-        let (holes, whole, cached, large) =
-            (film(12, 2, 1), film(12, 1, 1), film(12, 1, 2), film(16, 1, 9));
+        let (holes, whole, cached) = (film(12, 2, 1), film(12, 1, 1), film(12, 1, 2));
         let filtered = |film, other| quick(film, Some((other, 4.0))).pixels;
-        let blended = |film, other| blend(film, Some((other, 4.0))).pixels;
         assert_eq!(prepared(whole.clone(), cached.clone(), true), filtered(&whole, &cached));
         assert_eq!(prepared(holes.clone(), cached.clone(), false), filtered(&holes, &cached));
-        // The cached one has holes, is larger and says more.
-        assert_eq!(prepared(holes.clone(), holes.clone(), false), blended(&holes, &holes));
-        assert_eq!(prepared(whole.clone(), large.clone(), true), blended(&whole, &large));
-        // A smaller one with more samples is seen alone.
-        let [small, many] = [9, 99].map(|samples| film_of([6, 4], 1, samples));
-        assert_eq!(prepared(holes.clone(), small.clone(), false), quick(&small, None).pixels);
-        assert_eq!(prepared(cached.clone(), many.clone(), true), quick(&many, None).pixels);
-        let few = film_of([6, 4], 1, 3);
-        assert_eq!(prepared(whole.clone(), few.clone(), true), quick(&few, None).pixels);
+        // The cached one has holes, too.
+        let larger = holes.in_larger_pixels(2);
+        let enlarged = quick(&larger, Some((&larger, 4.0))).enlarged(2, [12, 8]).pixels;
+        assert_eq!(prepared(holes.clone(), holes.clone(), false), enlarged);
     }
 
     #[test]
@@ -257,7 +209,8 @@ pub(super) mod tests {
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();
             let source = Source { session, backdrop: None, denoiser, is_whole: true };
-            source.prepare(developer).picture.is_live()
+            let prepared = source.prepare(developer, &AtomicBool::new(false));
+            prepared.expect("not cancelled").picture.is_live()
         };
         assert!(!is_live(&developer, &session, None));
         let uploaded = developer.upload_film(&session.film, true);

@@ -11,7 +11,6 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 mod device;
-mod earlier;
 mod inspection;
 mod preparation;
 mod preview;
@@ -26,12 +25,11 @@ pub(super) mod tests;
 mod watch;
 
 use device::Device;
-use preview::Preview;
 pub(crate) use request::{Reference, Request};
 use session_cache::SessionCache;
 use sessions::Sessions;
 use shared::Shared;
-pub(crate) use snapshot::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
+pub(crate) use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
 use task::PictureTask;
 use watch::RequestWatch;
 
@@ -148,8 +146,8 @@ impl Drop for Worker {
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
     let device = || Device::new(gpu.clone(), Arc::clone(&shared.screen));
-    let fresh = || (device(), SessionCache::default(), Preview::default());
-    let (mut device, mut kept, mut preview) = fresh();
+    let fresh = || (device(), SessionCache::default());
+    let (mut device, mut kept) = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     let next = |done: Option<&Request>| {
@@ -174,12 +172,12 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
                 kept: &mut kept,
                 alarm: &alarm,
             };
-            let task = PictureTask::new(sessions, &mut preview);
+            let task = PictureTask::new(sessions);
             pool.install(|| task.work())
         }));
         done = Some(worked.unwrap_or_else(|_| {
             // The panic is on the terminal. Nothing of what it left is trusted.
-            (device, kept, preview) = fresh();
+            (device, kept) = fresh();
             alarm.set(None);
             shared.report_panic();
             request

@@ -1,13 +1,11 @@
-//! What is shown between samples and screen: copies of films in the making, and a film of the view from before.
+//! What is shown between samples and screen: copies of films in the making.
 
-use std::borrow::Cow;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-use super::earlier::EarlierFilm;
 use super::request::Request;
 use super::sessions::SLICE;
-use super::snapshot::{Backdrop, Origin, SessionSnapshot};
+use super::snapshot::{Backdrop, SessionSnapshot};
 use crate::render::Session;
 use crate::render::block_errors::{BlockErrors, block_errors};
 use crate::render::cached_picture::{CachedPicture, worth};
@@ -30,8 +28,6 @@ pub(super) const PLAIN: usize = 1;
 /// Decides when films are copied for the window, and which films it is shown together.
 #[derive(Default)]
 pub(super) struct Preview {
-    /// A film of what was seen last.
-    earlier: Option<EarlierFilm>,
     /// The main film that was shown last, the number of cached samples beside it, and the errors of both.
     errors: Option<(Weak<Film>, u64, Option<BlockErrors>)>,
     /// The main and the plain picture, as they were copied last.
@@ -55,29 +51,9 @@ struct FilmCopy {
 }
 
 impl Preview {
-    /// Begins with another request: of all films, one from before serves on that looks like it.
-    pub(super) fn begin(&mut self, request: &Request) {
-        let earlier = self.earlier.take().and_then(|earlier| earlier.begin(request));
-        *self = Self { earlier, ..Self::default() };
-    }
-
-    /// Goes on with the very picture that was left: what was kept of it to be seen meanwhile has the same samples.
-    pub(super) fn resume(&mut self, request: &Request) {
-        self.earlier.take_if(|earlier| earlier.is_of_same(request));
-    }
-
     /// Lets go of the copy of the plain picture.
     pub(super) fn end_plain(&mut self) {
         self.copies[PLAIN] = None;
-    }
-
-    /// Keeps a film for the next picture's first moments, unless there is a better one of the same view.
-    pub(super) fn keep(&mut self, request: &Arc<Request>, film: Cow<'_, Film>, worth: f32) {
-        let known = self.earlier.as_ref().map_or(0.0, |earlier| earlier.weight(&request.view));
-        if film.min_samples() > 0 && worth * film.total_samples() as f32 > known {
-            let film = Arc::new(film.into_owned());
-            self.earlier = Some(EarlierFilm::new(Arc::clone(request), film, worth));
-        }
     }
 
     /// Decides before a picture is published whether new copies are wanted, which are not where `is_throttled`. A
@@ -103,10 +79,8 @@ impl Preview {
     fn is_stale(&self, role: usize, in_place: Option<&(Gpu, DeviceFilm)>, rests: bool) -> bool {
         let serves = |copy: &FilmCopy| match (&copy.of, in_place) {
             (Some(read), Some(of)) => is_same(read, of) && copy.at.elapsed() < copy.gap,
-            // Before the first sample it was another picture, and none before pixels everywhere have one.
-            (None, None) => {
-                rests && copy.session.figures.samples > 0 && copy.session.film.is_begun()
-            }
+            // Before pixels everywhere have a sample there is nothing to be seen.
+            (None, None) => rests && copy.session.film.is_begun(),
             _ => false,
         };
         !self.copies[role].as_ref().is_some_and(serves)
@@ -139,8 +113,7 @@ impl Preview {
         !is_unseen && self.is_stale(role, in_place, self.rests)
     }
 
-    /// A session's picture, and what reading a film that is shown `in_place` took of the time. The main one's is the
-    /// film from before until it has a sample.
+    /// A session's picture, and what reading a film that is shown `in_place` took of the time.
     pub(super) fn session_snapshot(
         &mut self,
         role: usize,
@@ -154,10 +127,7 @@ impl Preview {
             Some(copy) => copy,
             None => {
                 let start = Instant::now();
-                let is_empty = role == MAIN && session.figures().samples == 0;
-                let earlier = self.earlier.as_ref().filter(|_| is_empty);
-                let film = earlier.and_then(|earlier| earlier.film_for(session.view()));
-                let film = film.unwrap_or_else(|| Arc::new(session.film().clone()));
+                let film = Arc::new(session.film().clone());
                 if session.figures().samples > 0 {
                     self.lent.push(Arc::downgrade(&film));
                 }
@@ -190,21 +160,15 @@ impl Preview {
         (snapshot, cost)
     }
 
-    /// The film that is shown together with the main picture's `exact` one, and the errors of both where they are known:
-    /// the cached film once it has clearly more to say than the one from before, as chance and gaps between its first
-    /// pixels count against it.
+    /// The film that is shown together with the main picture's `exact` one, and the errors of both where they are known.
     pub(super) fn backdrop(
         &mut self,
-        request: &Arc<Request>,
+        request: &Request,
         exact: &Arc<Film>,
         cached: Option<&CachedPicture<Session<'_>>>,
     ) -> (Option<Backdrop>, Option<BlockErrors>) {
-        // A film that was kept of this request has the same samples.
-        let earlier = self.earlier.as_ref().filter(|earlier| !earlier.is_of(request));
-        let earlier = earlier.and_then(|earlier| earlier.backdrop(&request.view));
-        let seen = earlier.as_ref().map_or(0, |earlier| earlier.samples);
         let cached = cached.filter(|_| request.wants_cached);
-        let cached = cached.and_then(|cached| self.cached_film(cached, 3 * seen / 2));
+        let cached = cached.and_then(|cached| self.cached_film(cached));
         let samples = cached.as_ref().map_or(0, |(samples, _)| *samples);
         let known = self.errors.take().filter(|(of, beside, _)| {
             std::ptr::eq(of.as_ptr(), Arc::as_ptr(exact)) && *beside == samples
@@ -213,26 +177,22 @@ impl Preview {
         let found = || block_errors(exact, other.filter(|film| exact.is_alike(film)));
         let errors = known.map_or_else(found, |(.., errors)| errors);
         self.errors = Some((Arc::downgrade(exact), samples, errors));
-        let shown = match cached {
-            Some((samples, film)) => {
-                let worth = worth(exact, &film, errors.as_ref());
-                Some(Backdrop { film, samples, worth, origin: Origin::Cache })
-            }
-            None => earlier,
-        };
+        let shown = cached.map(|(samples, film)| {
+            let worth = worth(exact, &film, errors.as_ref());
+            Backdrop { film, samples, worth }
+        });
         (shown.filter(|backdrop| backdrop.worth > 0.0), errors)
     }
 
-    /// The cached picture's film and how many samples that has, if these are more than `least` and all over the
-    /// picture. A copy is made unless there is a new one already or, while the window rests, any: it is megabytes.
+    /// The cached picture's film and how many samples that has, if these are all over the picture. A copy is made unless
+    /// there is a new one already or, while the window rests, any: it is megabytes.
     fn cached_film(
         &mut self,
         CachedPicture { session, .. }: &CachedPicture<Session<'_>>,
-        least: u64,
     ) -> Option<(u64, Arc<Film>)> {
         let copy = self.cached_copy.take();
         let samples = session.figures().samples;
-        if samples <= least || !session.is_begun() {
+        if !session.is_begun() {
             return None;
         }
         let copy = copy.filter(|(of, _)| self.rests || *of == samples);

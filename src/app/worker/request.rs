@@ -52,7 +52,7 @@ impl Request {
     }
 
     /// Whether the very same picture is rendered for both. Its map may have been turned back meanwhile, or read again.
-    pub(super) fn is_resumed_by(&self, new: &Self) -> bool {
+    pub(in crate::app) fn is_resumed_by(&self, new: &Self) -> bool {
         let (map, other) = (&self.environment, &new.environment);
         let is_equal = || map.map() == other.map() && map.tile_energies() == other.tile_energies();
         let is_as_lit = (map.shares_map_with(other) || is_equal())
@@ -82,17 +82,6 @@ impl Request {
         self.world.has_same_visibility(&other.world)
             && Arc::ptr_eq(&self.environment, &other.environment)
             && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
-    }
-
-    /// Whether a picture for `self` shows what one for `new` will show, but for its size and noise.
-    pub(super) fn looks_like(&self, new: &Self) -> bool {
-        let (a, b) = (&self.view, &new.view);
-        Arc::ptr_eq(&self.world, &new.world)
-            && Arc::ptr_eq(&self.environment, &new.environment)
-            && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
-            && (a.background, a.limits) == (b.background, b.limits)
-            // Whoever asks for other samples wants to see those.
-            && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
     }
 
     /// Whether surfaces look for `self` as they do for `new`, from wherever they are seen.

@@ -117,7 +117,7 @@ pub(crate) struct Snapshot {
     pub cache: Result<Arc<CacheFacts>, NoCache>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
-    /// Another film of the same view; its samples help where `main` has few.
+    /// The film by cached light that is shown together with `main`.
     pub backdrop: Option<Backdrop>,
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
     pub cached_seconds: f64,
@@ -148,26 +148,15 @@ impl PublishThrottle {
     }
 }
 
-/// A film that is shown together with the picture's own, and never saved.
+/// A film of the same view and size by light from a radiance cache. It is shown together with the picture's own.
 #[derive(Clone)]
 pub(crate) struct Backdrop {
-    /// Of any size.
+    /// The sums.
     pub film: Arc<Film>,
     /// Its samples, of all pixels together.
     pub samples: u64,
     /// What one of its samples counts beside one of the picture's own.
     pub worth: f32,
-    /// Where it comes from.
-    pub origin: Origin,
-}
-
-/// Where a film comes from that is shown together with the picture's own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Origin {
-    /// A radiance cache.
-    Cache,
-    /// A picture of the same view that was rendered before, as it is: it may be a small one.
-    Before,
 }
 
 impl Snapshot {
@@ -183,13 +172,8 @@ impl Snapshot {
     }
 
     fn cached_samples(&self) -> f64 {
-        let cached = self.cached_film();
+        let cached = self.backdrop.as_ref();
         cached.map_or(0.0, |it| it.samples as f64 / it.film.pixels().len().max(1) as f64)
-    }
-
-    /// The film by cached light that is shown.
-    pub(crate) fn cached_film(&self) -> Option<&Backdrop> {
-        self.backdrop.as_ref().filter(|backdrop| backdrop.origin == Origin::Cache)
     }
 
     /// Seconds of learning and rendering, cached light included.
@@ -197,7 +181,7 @@ impl Snapshot {
         self.now.elapsed_seconds() + self.cached_seconds
     }
 
-    /// What is seen in the film: before the first sample it may be one of another size.
+    /// What is seen in the film: while the camera moves it is one of another size.
     pub(crate) fn view(&self) -> View {
         let (view, film) = (&self.request.view, &self.main.film);
         if view.crop.is_some() { view.clone() } else { view.of_size(film.width, film.height) }

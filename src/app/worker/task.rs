@@ -1,6 +1,5 @@
 //! One request being worked on.
 
-use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,7 +13,6 @@ use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
 use crate::render::cached_picture::{CachedPicture, suits, view};
-use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Phase, Sampling, Session, StopRule, View, cut_off_notice};
 
@@ -24,7 +22,7 @@ const STANDSTILL: Duration = Duration::from_millis(400);
 /// Works on one request until something else is asked for.
 pub(super) struct PictureTask<'a> {
     sessions: Sessions<'a>,
-    preview: &'a mut Preview,
+    preview: Preview,
     inspection: Inspection,
     /// What learning has counted, once it has ended.
     counters: Option<Arc<LearningGrid>>,
@@ -83,14 +81,13 @@ impl<'s> Pictures<'s> {
 }
 
 impl<'a> PictureTask<'a> {
-    pub(super) fn new(sessions: Sessions<'a>, preview: &'a mut Preview) -> Self {
+    pub(super) fn new(sessions: Sessions<'a>) -> Self {
         let request = &sessions.watch.request;
-        preview.begin(request);
         Self {
             suits_cached: !request.moving && suits(&request.world, &request.view),
             cut_off: OnceCell::new(),
             sessions,
-            preview,
+            preview: Preview::default(),
             inspection: Inspection::default(),
             counters: None,
             cached_seconds: 0.0,
@@ -132,7 +129,6 @@ impl<'a> PictureTask<'a> {
                 break;
             }
             self.sessions.measure(&pictures.main);
-            self.keep_earlier(Cow::Borrowed(pictures.main.film()), 1.0);
             self.publish(Activity::Moving, &pictures);
             if pictures.main.samples() >= 64 {
                 self.sessions.rest();
@@ -185,7 +181,6 @@ impl<'a> PictureTask<'a> {
     fn begin_pictures(&mut self) -> Pictures<'a> {
         let request = Arc::clone(self.request());
         if let Some(left) = self.sessions.kept.come_back(&request) {
-            self.preview.resume(&request);
             (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
             self.inspection.curves[MAIN] = left.curve;
             let (world, environment) = (self.sessions.world, self.sessions.environment);
@@ -266,11 +261,6 @@ impl<'a> PictureTask<'a> {
         {
             self.sessions.keep_training(&mut cached.session);
         }
-        // The film that says more is seen until the next picture does.
-        let shown = cached.as_ref().filter(|_| main.samples() > 0);
-        if let Some((film, worth)) = shown.and_then(|cached| cached.film_beside(main.film())) {
-            self.keep_earlier(Cow::Borrowed(film), worth);
-        }
         let mut left = SuspendedPicture {
             request: Arc::clone(self.request()),
             session: main.suspend(),
@@ -279,18 +269,9 @@ impl<'a> PictureTask<'a> {
             curve: std::mem::take(&mut self.inspection.curves[MAIN]),
             cached_seconds: self.cached_seconds,
         };
-        let is_worth_it = left.is_worth_it();
-        if !is_worth_it {
-            return self.keep_earlier(Cow::Owned(left.session.into_film()), 1.0);
+        if left.is_worth_it() {
+            self.sessions.kept.leave(left);
         }
-        if let Some(film) = left.session.film() {
-            self.keep_earlier(Cow::Borrowed(film), 1.0);
-        }
-        self.sessions.kept.leave(left);
-    }
-
-    fn keep_earlier(&mut self, film: Cow<'_, Film>, worth: f32) {
-        self.preview.keep(&self.sessions.watch.request, film, worth);
     }
 
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached

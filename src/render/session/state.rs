@@ -75,11 +75,6 @@ impl SessionState {
         self.film.known()
     }
 
-    /// The film alone.
-    pub(crate) fn into_film(mut self) -> Film {
-        self.film.take(&self.view)
-    }
-
     /// Seconds of learning and rendering.
     pub(crate) fn elapsed_seconds(&self) -> f64 {
         self.figures.elapsed_seconds()

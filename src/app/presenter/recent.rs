@@ -1,0 +1,82 @@
+//! The pictures that were shown last: whoever comes back to one sees it at once, before it is filtered anew.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::order::Order;
+use crate::app::worker::Request;
+use crate::denoise::Denoiser;
+use crate::image::Image;
+
+/// So many are kept.
+const COUNT: usize = 3;
+
+/// Pictures by what they are of, the last one first.
+#[derive(Default)]
+pub(super) struct Recent(VecDeque<(Arc<Request>, Option<Denoiser>, Arc<Image>)>);
+
+impl Recent {
+    /// Keeps what an order was to show, in place of what there was of the same request; pictures of other scenes go.
+    pub(super) fn keep(&mut self, order: &Order, image: &Arc<Image>) {
+        let request = &order.snapshot.request;
+        self.0.retain(|(kept, ..)| {
+            Arc::ptr_eq(&kept.world, &request.world) && !kept.is_resumed_by(request)
+        });
+        self.0.push_front((Arc::clone(request), order.denoiser, Arc::clone(image)));
+        self.0.truncate(COUNT);
+    }
+
+    /// What was shown for an order's picture when that was left, if it is the first order since.
+    pub(super) fn come_back(&self, order: &Order) -> Option<&Arc<Image>> {
+        let snapshot = &order.snapshot;
+        let is_it = |(request, denoiser, _): &&(Arc<Request>, Option<Denoiser>, _)| {
+            request.is_resumed_by(&snapshot.request)
+                && !Arc::ptr_eq(request, &snapshot.request)
+                && *denoiser == order.denoiser
+        };
+        let (.., image) = self.0.iter().find(is_it).filter(|_| snapshot.is_lasting())?;
+        Some(image)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::presenter::source::tests::{film, session};
+    use crate::app::worker::tests::{request_of, snapshot_of};
+    use crate::develop::tests::developer;
+
+    #[test]
+    fn whoever_comes_back_finds_the_picture_that_was_left() {
+        let Some(developer) = developer().map(Arc::new) else { return };
+        let order = |request: &Arc<Request>| Order {
+            developer: Arc::clone(&developer),
+            snapshot: Arc::new(snapshot_of(request, session(film(12, 1, 1)))),
+            ahead: None,
+            denoiser: Some(Denoiser::ATrous),
+            metered: None,
+            overlay: None,
+            look: None,
+            tile: None,
+            compared: None,
+        };
+        let left = Arc::new(request_of("open", [12, 8]));
+        let image = Arc::new(film(12, 1, 1).image());
+        let mut recent = Recent::default();
+        recent.keep(&order(&left), &image);
+        assert!(recent.come_back(&order(&left)).is_none(), "it goes on");
+        let again = Arc::new((*left).clone());
+        let found = recent.come_back(&order(&again)).expect("it is the same picture");
+        assert!(Arc::ptr_eq(found, &image));
+        let raw = Order { denoiser: None, ..order(&again) };
+        assert!(recent.come_back(&raw).is_none(), "with its noise it is another");
+        let mut moved = (*left).clone();
+        moved.view.camera.world_from_camera.translation.x += 1.0;
+        assert!(recent.come_back(&order(&Arc::new(moved))).is_none());
+        recent.keep(&order(&again), &image);
+        assert_eq!(recent.0.len(), 1, "one of each");
+        // Another scene.
+        recent.keep(&order(&Arc::new(request_of("crack", [12, 8]))), &image);
+        assert_eq!(recent.0.len(), 1);
+    }
+}
