@@ -106,7 +106,9 @@ impl Memory {
         }
         let source = Source::main(order);
         let prepare = || match self.recent.come_back(order) {
-            Some(image) => Ok(Some(Prepared::of(&developer, Arc::clone(image)))),
+            Some((image, is_carried)) => {
+                Ok(Some(Prepared { is_carried, ..Prepared::of(&developer, image) }))
+            }
             None => Ok(source.prepare(&developer, cancel)),
         };
         let Some(own) = self.uploads.picture.or_try(source.key(), prepare)? else {
@@ -116,8 +118,8 @@ impl Memory {
         let complete = || Ok(self.carried.carry(order, own));
         let Prepared { mut picture, image, is_carried, mut failure } =
             self.uploads.completed.or_make(key, complete)?;
-        if let Some(image) = image.as_ref().filter(|_| order.snapshot.is_lasting() && !is_carried) {
-            self.recent.keep(order, image);
+        if let Some(image) = image.as_ref().filter(|_| order.snapshot.is_lasting()) {
+            self.recent.keep(order, image, is_carried);
         }
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(order) {

@@ -11,31 +11,41 @@ use crate::image::Image;
 /// So many are kept.
 const COUNT: usize = 3;
 
-/// Pictures by what they are of, the last one first.
+/// The last pictures, the newest first.
 #[derive(Default)]
-pub(super) struct Recent(VecDeque<(Arc<Request>, Option<Denoiser>, Arc<Image>)>);
+pub(super) struct Recent(VecDeque<Picture>);
+
+/// A picture that was shown.
+struct Picture {
+    request: Arc<Request>,
+    denoiser: Option<Denoiser>,
+    image: Arc<Image>,
+    is_carried: bool,
+}
 
 impl Recent {
-    /// Keeps what an order was to show, in place of what there was of the same request; pictures of other scenes go.
-    pub(super) fn keep(&mut self, order: &Order, image: &Arc<Image>) {
-        let request = &order.snapshot.request;
-        self.0.retain(|(kept, ..)| {
-            Arc::ptr_eq(&kept.world, &request.world) && !kept.is_resumed_by(request)
+    /// Keeps what was shown for an order, in place of what there was of the same request; pictures of other scenes go.
+    pub(super) fn keep(&mut self, order: &Order, image: &Arc<Image>, is_carried: bool) {
+        let request = Arc::clone(&order.snapshot.request);
+        self.0.retain(|kept| {
+            Arc::ptr_eq(&kept.request.world, &request.world)
+                && !kept.request.is_resumed_by(&request)
         });
-        self.0.push_front((Arc::clone(request), order.denoiser, Arc::clone(image)));
+        let (denoiser, image) = (order.denoiser, Arc::clone(image));
+        self.0.push_front(Picture { request, denoiser, image, is_carried });
         self.0.truncate(COUNT);
     }
 
-    /// What was shown for an order's picture when that was left, if it is the first order since.
-    pub(super) fn come_back(&self, order: &Order) -> Option<&Arc<Image>> {
-        let snapshot = &order.snapshot;
-        let is_it = |(request, denoiser, _): &&(Arc<Request>, Option<Denoiser>, _)| {
-            request.is_resumed_by(&snapshot.request)
-                && !Arc::ptr_eq(request, &snapshot.request)
-                && *denoiser == order.denoiser
+    /// What was shown when an order's picture was left, if it is the first order since, and whether that was carried.
+    pub(super) fn come_back(&self, order: &Order) -> Option<(Arc<Image>, bool)> {
+        let request = &order.snapshot.request;
+        let is_it = |kept: &&Picture| {
+            kept.request.is_resumed_by(request)
+                && !Arc::ptr_eq(&kept.request, request)
+                && kept.denoiser == order.denoiser
         };
-        let (.., image) = self.0.iter().find(is_it).filter(|_| snapshot.is_lasting())?;
-        Some(image)
+        let kept = self.0.iter().find(is_it).filter(|_| order.snapshot.is_lasting())?;
+        Some((Arc::clone(&kept.image), kept.is_carried))
     }
 }
 
@@ -63,20 +73,20 @@ mod tests {
         let left = Arc::new(request_of("open", [12, 8]));
         let image = Arc::new(film(12, 1, 1).image());
         let mut recent = Recent::default();
-        recent.keep(&order(&left), &image);
+        recent.keep(&order(&left), &image, true);
         assert!(recent.come_back(&order(&left)).is_none(), "it goes on");
         let again = Arc::new((*left).clone());
-        let found = recent.come_back(&order(&again)).expect("it is the same picture");
-        assert!(Arc::ptr_eq(found, &image));
+        let (found, is_carried) = recent.come_back(&order(&again)).expect("it is the same picture");
+        assert!(Arc::ptr_eq(&found, &image) && is_carried);
         let raw = Order { denoiser: None, ..order(&again) };
         assert!(recent.come_back(&raw).is_none(), "with its noise it is another");
         let mut moved = (*left).clone();
         moved.view.camera.world_from_camera.translation.x += 1.0;
         assert!(recent.come_back(&order(&Arc::new(moved))).is_none());
-        recent.keep(&order(&again), &image);
+        recent.keep(&order(&again), &image, false);
         assert_eq!(recent.0.len(), 1, "one of each");
         // Another scene.
-        recent.keep(&order(&Arc::new(request_of("crack", [12, 8]))), &image);
+        recent.keep(&order(&Arc::new(request_of("crack", [12, 8]))), &image, false);
         assert_eq!(recent.0.len(), 1);
     }
 }
