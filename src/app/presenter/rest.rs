@@ -5,8 +5,8 @@ use std::time::Duration;
 use crate::system::thread_cpu_time;
 
 /// After a picture of work that goes on it rests so many times as long as that took: little at first, when each is better
-/// than the last, and most at the end of [`SLOWING`]. Of the machine half of whose cores it has, it takes 15 and 3 %.
-const REST: [f64; 2] = [2.4, 16.0];
+/// than the last, and most at the end of [`SLOWING`]. Of the machine half of whose cores it has, it takes 9 and 3 %.
+const REST: [f64; 2] = [4.5, 16.0];
 /// Rest after a moving camera's picture, over the time that picture took: short, since eyes follow it.
 pub(super) const MOVING_REST: f64 = 0.5;
 /// Seconds of work on a view while pictures change less and less.
@@ -49,7 +49,7 @@ mod tests {
         let seconds = Duration::from_secs_f64;
         assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
         assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
-        assert_eq!(rest_after(seconds(0.5), 60.0), seconds(1.2));
+        assert_eq!(rest_after(seconds(0.5), 60.0), seconds(2.25));
         assert_eq!(rest_after(seconds(0.5), 1e9), seconds(8.0));
     }
 }

@@ -8,7 +8,7 @@ use super::Desk;
 const MAX_SHARE_OF_WORK: f64 = 0.4;
 /// Share of the work that showing may take where others want the cores, too: it goes by the clock.
 const MAX_SHARE_FOR_SHOWING: f64 = 0.3;
-/// The same on a quiet machine of two cores, in the first minute, where a picture follows the other within three seconds.
+/// The same on a quiet machine of two cores, in the first minute, when one picture follows another within seconds.
 const MAX_SHARE_OF_A_MINUTE: f64 = 0.15;
 
 #[test]
