@@ -105,7 +105,7 @@ fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
         writing = BYTES_OF_COPY;
     }
     if arguments.seconds.is_some() {
-        // Where pixels have no sample, a copy of the film has that of one beside them.
+        // Where pixels have no sample, a copy of the film has the mean of those around them.
         writing += film;
     }
     let [film, writing] = [film, writing].map(|bytes| u64::from(width) * u64::from(height) * bytes);

@@ -144,7 +144,7 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     let coverage = film.coverage();
     if coverage < 1.0 {
         remarks.push(format!(
-            "it ended when {:.0} % of the pixels had a sample: the others show one beside them",
+            "it ended when {:.0} % of the pixels had a sample: the others show the mean of those around them",
             100.0 * coverage
         ));
     }
