@@ -148,7 +148,8 @@ fn under(seen: &[Option<[f32; 3]>], small: &Image, [width, height]: [u32; 2]) ->
     Image { width, height, pixels }
 }
 
-/// The mean of a picture of so many `samples` and of what is seen, which is worth as many as that, where both agree.
+/// The weighted mean of a picture and of what is seen, where both agree. Weights are samples a pixel: `samples` of the
+/// picture, `worth` of what is seen.
 fn faded(seen: &[Option<[f32; 3]>], own: &Image, samples: f32, worth: f32) -> Image {
     let noise = samples.min(1.0).sqrt().recip();
     let agreement = agreement(seen, own, DIFFERENCES.map(|difference| noise * difference));
@@ -194,6 +195,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
+    use crate::app::presenter::order::tests::order_of;
     use crate::app::presenter::source::tests::session;
     use crate::app::worker::SessionSnapshot;
     use crate::app::worker::tests::{request_of, snapshot_of};
@@ -227,15 +229,8 @@ mod tests {
         };
         let image_of = |prepared: Prepared| prepared.image.expect("made on the host");
         let order = |request: &Request, film: &Film| Order {
-            developer: Arc::clone(&developer),
-            snapshot: Arc::new(snapshot(request, film)),
-            ahead: None,
             denoiser: Some(Denoiser::ATrous),
-            metered: None,
-            overlay: None,
-            look: None,
-            tile: None,
-            compared: None,
+            ..order_of(&developer, snapshot(request, film))
         };
         let complete = |carried: &Carried, request: &Request, film: &Film| {
             image_of(carried.complete(&order(request, film), own(film)))

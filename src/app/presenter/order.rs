@@ -128,23 +128,20 @@ pub(crate) struct Shown {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::app::presenter::source::tests::{film, session};
     use crate::app::worker::SessionSnapshot;
     use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::develop::tests::developer;
 
-    #[test]
-    fn a_movement_does_not_wait_for_the_picture_before_it() {
-        let Some(developer) = developer().map(Arc::new) else { return };
-        let still = Arc::new(request_of("open", [12, 8]));
-        let order = |request: &Arc<Request>, samples| Order {
-            developer: Arc::clone(&developer),
-            snapshot: Arc::new(snapshot_of(
-                request,
-                SessionSnapshot { samples, ..session(film(12, 1, 1)) },
-            )),
+    pub(in crate::app::presenter) fn order_of(
+        developer: &Arc<Developer>,
+        snapshot: Snapshot,
+    ) -> Order {
+        Order {
+            developer: Arc::clone(developer),
+            snapshot: Arc::new(snapshot),
             ahead: None,
             denoiser: None,
             metered: None,
@@ -152,6 +149,18 @@ mod tests {
             look: None,
             tile: None,
             compared: None,
+        }
+    }
+
+    #[test]
+    fn a_movement_does_not_wait_for_the_picture_before_it() {
+        let Some(developer) = developer().map(Arc::new) else { return };
+        let still = Arc::new(request_of("open", [12, 8]));
+        let order = |request: &Arc<Request>, samples| {
+            order_of(
+                &developer,
+                snapshot_of(request, SessionSnapshot { samples, ..session(film(12, 1, 1)) }),
+            )
         };
         let [moving, later] =
             [(); 2].map(|()| Arc::new(Request { moving: true, ..(*still).clone() }));

@@ -52,6 +52,7 @@ impl Recent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::presenter::order::tests::order_of;
     use crate::app::presenter::source::tests::{film, session};
     use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::develop::tests::developer;
@@ -60,15 +61,8 @@ mod tests {
     fn whoever_comes_back_finds_the_picture_that_was_left() {
         let Some(developer) = developer().map(Arc::new) else { return };
         let order = |request: &Arc<Request>| Order {
-            developer: Arc::clone(&developer),
-            snapshot: Arc::new(snapshot_of(request, session(film(12, 1, 1)))),
-            ahead: None,
             denoiser: Some(Denoiser::ATrous),
-            metered: None,
-            overlay: None,
-            look: None,
-            tile: None,
-            compared: None,
+            ..order_of(&developer, snapshot_of(request, session(film(12, 1, 1))))
         };
         let left = Arc::new(request_of("open", [12, 8]));
         let image = Arc::new(film(12, 1, 1).image());

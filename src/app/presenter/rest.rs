@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::system::thread_cpu_time;
 
-/// After a picture of work that goes on it rests so many times as long as that took: little at first, when each is better
-/// than the last, and most at the end of [`SLOWING`]. Of the machine half of whose cores it has, it takes 9 and 3 %.
+/// Rest after a picture of unfinished work, over the time that the picture took: the first until [`SLOWING`] begins, the
+/// second from its end on. Of the machine half of whose cores it has, it takes 9 and 3 %.
 const REST: [f64; 2] = [4.5, 16.0];
 /// Rest after a moving camera's picture, over the time that picture took: short, since eyes follow it.
 pub(super) const MOVING_REST: f64 = 0.5;

@@ -35,7 +35,7 @@ impl Prepared {
     }
 }
 
-/// Until so many seconds were spent on a view, a device that filters by itself shows it at once.
+/// Seconds of work on a view during which a device that can filter uses the built-in filter: it is the quickest.
 const YOUNG_SECONDS: f64 = 1.0;
 
 /// What a linear picture is made from.
