@@ -25,7 +25,7 @@ use super::threads::Wakes;
 use super::{panels, theme};
 use crate::error::{Error, Result};
 use crate::render::gpu::RayChoice;
-use crate::scene::CameraPlace;
+use crate::scene::StartView;
 
 /// What is shown at the start.
 #[derive(Debug, Clone, Default)]
@@ -33,7 +33,7 @@ pub struct Start {
     /// The picture.
     pub document: Document,
     /// Where it is taken from, in place of what the document says.
-    pub place: Option<CameraPlace>,
+    pub place: Option<StartView>,
     /// What is open.
     pub interface: Interface,
     /// What earlier windows left.

@@ -10,8 +10,9 @@ use super::reload::Reload;
 use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
+use crate::error::Result;
 use crate::path::framing;
-use crate::scene::{Camera, CameraPlace, Material};
+use crate::scene::{Camera, Material, StartView};
 use crate::sources;
 
 /// A map turned and scaled.
@@ -184,10 +185,22 @@ impl Assets {
     }
 }
 
-/// From a place that was asked for, which is turned about what it looks at.
-pub(super) fn viewpoint_at(scene: &LoadedScene, place: &CameraPlace) -> Viewpoint {
-    let camera = place.camera(scene.world.scene.frame);
-    Viewpoint::of(&camera, camera.focus_distance)
+/// From where it was asked for; a place is turned about what it looks at.
+///
+/// # Errors
+/// If the scene has no such camera.
+pub(super) fn start_viewpoint(scene: &LoadedScene, from: &StartView) -> Result<Viewpoint> {
+    let of_file = &scene.world.scene;
+    match from {
+        StartView::Place(place) => {
+            let camera = place.camera(of_file.frame);
+            Ok(Viewpoint::of(&camera, camera.focus_distance))
+        }
+        StartView::Camera(name) => {
+            let number = of_file.camera_number(name, &scene.name)?;
+            Ok(viewpoint_through(scene, &of_file.cameras[number], false))
+        }
+    }
 }
 
 /// Through the scene's first camera, or of all of it where there is none.

@@ -5,7 +5,7 @@ use super::loader::LoadedScene;
 use super::undo::Undo;
 use crate::error::Decoded;
 use crate::memory;
-use crate::scene::CameraPlace;
+use crate::scene::StartView;
 
 /// Bytes that a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
 /// and that will be, and the denoiser's planes (measured: 630).
@@ -20,7 +20,7 @@ pub(super) struct Edited {
     /// What the window was opened with.
     pub(super) start: Document,
     /// Where the first picture is to be taken from, until there is its scene.
-    pub(super) place: Option<CameraPlace>,
+    pub(super) place: Option<StartView>,
     /// Pixels of the room that the picture has had last.
     room: Option<[u32; 2]>,
     /// The size of the picture for which there is memory, and the region.
@@ -29,7 +29,7 @@ pub(super) struct Edited {
 
 impl Edited {
     /// Begins without steps.
-    pub(super) fn new(document: Document, place: Option<CameraPlace>) -> Self {
+    pub(super) fn new(document: Document, place: Option<StartView>) -> Self {
         let (undo, start) = (Undo::new(document.clone()), document.clone());
         let affordable = (PictureSize::Viewport(1), None);
         Self { document, undo, start, place, room: None, affordable }

@@ -4,13 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::application::App;
-use super::assets::{Assets, first_viewpoint, viewpoint_at};
+use super::assets::{Assets, first_viewpoint, start_viewpoint};
 use super::comparison::Comparison;
 use super::document::{Document, number_now};
 use super::edited::Edited;
 use super::interface::Chosen;
 use super::library::Library;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
+use super::messages::Messages;
 use super::tasks::TaskResult;
 use super::worker::{Request, Snapshot};
 use crate::denoise::Denoiser;
@@ -77,7 +78,7 @@ impl App {
             None => {}
         }
         self.assets.scene = Some(scene);
-        fill_in_viewpoint(&mut self.edited, &self.assets);
+        fill_in_viewpoint(&mut self.edited, &self.assets, &mut self.messages);
         if is_first {
             // An empty window is nothing to go back to.
             self.edited.amend(|_| ());
@@ -225,7 +226,7 @@ impl App {
 
     /// Tells the loader, the worker and the presenter what is wanted now.
     pub(super) fn send_down(&mut self, context: &egui::Context) {
-        fill_in_viewpoint(&mut self.edited, &self.assets);
+        fill_in_viewpoint(&mut self.edited, &self.assets, &mut self.messages);
         self.edited.follow_room(self.interface.viewport_pixels);
         self.assets.load(&self.edited.document);
         if let Some(request) = self.request(context.time()) {
@@ -292,12 +293,16 @@ impl App {
 }
 
 /// Looks from somewhere, where the document does not say from where.
-fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets) {
+fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets, messages: &mut Messages) {
     if edited.document.viewpoint.is_none()
         && let Some(scene) = assets.scene_of(&edited.document)
     {
-        let viewpoint = match edited.place.take() {
-            Some(place) => viewpoint_at(scene, &place),
+        let viewpoint = match edited.place.take().map(|from| start_viewpoint(scene, &from)) {
+            Some(Ok(viewpoint)) => viewpoint,
+            Some(Err(error)) => {
+                messages.error(error.to_string());
+                first_viewpoint(scene)
+            }
             None => first_viewpoint(scene),
         };
         edited.put_back(|document| document.viewpoint = Some(viewpoint));

@@ -4,11 +4,22 @@ use glam::DVec3;
 
 use super::values;
 use crate::error::{Error, Result};
+#[cfg(feature = "window")]
+use crate::scene::StartView;
 use crate::scene::{Camera, CameraPlace, Projection};
 
 /// A place, in place of a camera of the file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
 pub(super) struct CameraArguments {
+    /// One of the file's cameras: its name, or its number counted from 0.
+    #[arg(
+        long,
+        conflicts_with = "eye",
+        allow_hyphen_values = true,
+        value_name = "NAME|N",
+        help_heading = "Camera"
+    )]
+    pub(super) camera: Option<String>,
     /// Camera position in metres, instead of a camera of the file.
     #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
     pub(super) eye: Option<DVec3>,
@@ -57,10 +68,11 @@ impl CameraArguments {
     /// # Errors
     /// As [`Self::placed`], and if there is but a field of view.
     #[cfg(feature = "window")]
-    pub(super) fn place_alone(&self) -> Result<Option<CameraPlace>> {
+    pub(super) fn start_view(&self) -> Result<Option<StartView>> {
         if self.fov.is_some() && self.eye.is_none() {
             return Err(Error::new("--fov is that of a camera at --eye, which is not given"));
         }
-        self.placed()
+        let named = || self.camera.clone().map(StartView::Camera);
+        Ok(self.placed()?.map(StartView::Place).or_else(named))
     }
 }

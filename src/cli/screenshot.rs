@@ -184,7 +184,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     let mut studio = Studio::open(Shot {
         start: Start {
             document,
-            place: arguments.place.place_alone()?,
+            place: arguments.place.start_view()?,
             interface: interface(arguments),
             of_scene: arguments.of_scene.options_beside(vec![arguments.output.clone()]),
             adapter: arguments.adapter.clone(),

@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
     let start = Start {
         document: document(arguments, &settings),
-        place: arguments.place.place_alone()?,
+        place: arguments.place.start_view()?,
         interface: settings.interface(),
         settings,
         of_scene: arguments.of_scene.options(),

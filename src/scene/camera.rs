@@ -45,6 +45,15 @@ pub struct CameraPlace {
     pub fov_y_radians: f32,
 }
 
+/// Where the first picture is taken from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StartView {
+    /// From a place.
+    Place(CameraPlace),
+    /// Through the file's camera of this name or, if none has it, of this number, counted from 0.
+    Camera(String),
+}
+
 impl CameraPlace {
     /// The camera there, in a scene that lies so in its file.
     pub fn camera(&self, frame: Frame) -> Camera {

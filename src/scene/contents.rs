@@ -13,7 +13,7 @@ use super::instances::{Instances, Surface};
 use super::light::PunctualLight;
 use super::material::{Material, Texture, TextureImage};
 use super::medium::Medium;
-use crate::error::Notices;
+use crate::error::{Error, Notices, Result};
 
 /// All that can be rendered, ready for a BVH: in world space, but for meshes that instances share.
 ///
@@ -74,6 +74,22 @@ impl Scene {
         let shared: u64 = instances.meshes().iter().map(|mesh| mesh.len() as u64).sum();
         let shown: u64 = instances.iter().map(|instance| of_mesh(instance.mesh)).sum();
         self.triangles.len() as u64 - shared + shown
+    }
+
+    /// Index of the camera that `--camera` names, or else counts from 0.
+    ///
+    /// # Errors
+    /// If the scene, which came from `file`, has no such camera.
+    pub(crate) fn camera_number(&self, name: &str, file: &str) -> Result<usize> {
+        let named = self.cameras.iter().position(|camera| camera.name == name);
+        let counted = || name.parse().ok().filter(|number| *number < self.cameras.len());
+        named.or_else(counted).ok_or_else(|| {
+            let there_are = match self.cameras.len() {
+                0 => "no camera".to_owned(),
+                count => format!("no such camera, but 0 to {}: see `lightgrid info`", count - 1),
+            };
+            Error::new(format!("--camera {name}: {file} has {there_are}"))
+        })
     }
 
     /// World positions of the corners of a triangle, given its number.

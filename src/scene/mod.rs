@@ -22,7 +22,7 @@ mod placing;
 pub mod surface;
 pub mod texture;
 
-pub use camera::{Camera, CameraPlace, Projection};
+pub use camera::{Camera, CameraPlace, Projection, StartView};
 pub use contents::Scene;
 pub use frame::Frame;
 pub(crate) use frame::in_digits;

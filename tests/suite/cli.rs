@@ -483,8 +483,7 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--env-sun -1", "must not be negative"),
         ("--threads 1000000", "is not in 0..=1024"),
         ("--spp 1.5", "expected a whole number from 1 to 4294967295"),
-        ("--camera -1", "-1 is not in 0..=4294967295"),
-        ("--camera 1.5", "expected a whole number from 0 to 4294967295"),
+        ("--camera 0 --eye 1,1,1 --target 0,0,0", "cannot be used with"),
         ("--seed 18446744073709551615", "18446744073709551615 is not in 0..=4294967295"),
         ("--tiles 257x1", "at most 256x256"),
         ("--grid 1", "1 is not in 2..=256"),
@@ -501,6 +500,21 @@ fn wrong_values_are_refused_with_the_reason() {
         let message = bench.refusal(&render_line(&format!("-o a.png {rest}")), 2);
         assert!(message.contains(reason), "{rest}: {message}");
     }
+}
+
+#[test]
+fn a_camera_goes_by_its_name_or_its_number() {
+    let bench = Bench::new();
+    let [named, counted, first] = ["round window", "2", "0"].map(|camera| {
+        let mut command = bench.command(
+            "render living-room --size 16x9 --spp 1 --gi exact --reproducible -o a.png --camera",
+        );
+        let output = command.arg(camera).output().expect("the binary starts");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        fs::read(bench.path("a.png")).expect("written")
+    });
+    assert_eq!(named, counted);
+    assert_ne!(named, first);
 }
 
 #[test]
@@ -534,6 +548,10 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
             "scene.gltf: is a glTF scene, where a map",
         ),
         ("render scene.gltf -o a.png --env sky:mars".into(), "no built-in sky called \"mars\""),
+        (
+            "render open -o a.png --camera sofa".into(),
+            "--camera sofa: open has no such camera, but 0 to ",
+        ),
         ("render open -o a.png --variant red".into(), "open: there is no variant red: it has none"),
         ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
         ("info none.exr".into(), "none.exr: there is no such file"),

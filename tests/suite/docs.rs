@@ -442,7 +442,7 @@ fn every_picture_is_shown_and_has_its_command() {
     let shown: Vec<String> = pages().iter().flat_map(|page| targets(&split(page).1)).collect();
     let commands = all_shown().into_iter().filter(|shown| shown.kind == Kind::Picture);
     let made: Vec<String> = commands.filter_map(|shown| shown.words.last().cloned()).collect();
-    let scripts = ["docs/moving.sh", "docs/strip.sh", "docs/relearn.sh"]
+    let scripts = ["docs/blender.py", "docs/moving.sh", "docs/strip.sh", "docs/relearn.sh"]
         .map(|script| fs::read_to_string(root().join(script)).expect("there"));
     for entry in fs::read_dir(root().join("docs/pictures")).expect("a folder") {
         let name = entry.expect("readable").file_name().into_string().expect("UTF-8");

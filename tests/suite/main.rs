@@ -6,6 +6,7 @@
 mod app;
 #[cfg(feature = "report")]
 mod bench;
+mod blender;
 mod bsdf;
 mod builtin;
 mod bvh;

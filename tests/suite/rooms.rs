@@ -161,7 +161,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6465),
     ("report", 3156),
     ("sampler", 145),
-    ("scene", 10144),
+    ("scene", 10150),
     ("shaders", 6060),
     ("sources", 119),
     ("stability", 1891),

@@ -78,9 +78,6 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_parser = values::corners, allow_hyphen_values = true, value_name = "X,Y,Z,X,Y,Z", help_heading = "Fog")]
     pub(super) fog_box: Option<[Vec3; 2]>,
 
-    /// Which of the file's cameras, counted from 0.
-    #[arg(long, value_parser = values::whole::<usize>(0..=u32::MAX), value_name = "N", help_heading = "Camera")]
-    pub(super) camera: Option<usize>,
     #[command(flatten)]
     pub(in crate::cli) place: CameraArguments,
     /// Radius of a thin lens in metres; 0 keeps everything sharp.
@@ -352,15 +349,8 @@ impl RenderArguments {
         let frame = world.scene.frame;
         let camera = if let Some(place) = self.place.placed()? {
             place.camera(frame)
-        } else if let Some(index) = self.camera {
-            cameras.get(index).cloned().ok_or_else(|| {
-                let there_are = match cameras.len() {
-                    0 => "no camera".to_owned(),
-                    1 => "one camera, number 0".to_owned(),
-                    count => format!("cameras 0 to {}", count - 1),
-                };
-                Error::new(format!("--camera {index}: {} has {there_are}", self.scene))
-            })?
+        } else if let Some(name) = &self.place.camera {
+            cameras[world.scene.camera_number(name, &self.scene)?].clone()
         } else if let Some(camera) = cameras.first() {
             camera.clone()
         } else {
