@@ -105,7 +105,12 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
     };
     // As it is shown. RGB of linear pictures is exact.
     let cached = snapshot.backdrop.as_ref().map(|cached| (&*cached.film, cached.worth));
-    write_picture(path, &options, Films { film: record.film, cached }, record.metadata())
+    write_picture(
+        path,
+        &options,
+        Films { film: record.film, cached, denoised: None },
+        record.metadata(),
+    )
 }
 
 /// Changes to materials, as `--material` reads them.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::picture::{PictureArguments, say_written};
+use super::picture::PictureArguments;
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
@@ -75,10 +75,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     }
     let Some(film) = joined else { return Err(Error::new("there is no part to be merged")) };
     let metadata = metadata(&parts, &film);
-    let write = |path: &PathBuf| {
-        picture.write(path, (&film).into(), &metadata).map(|()| say_written(path)).err()
-    };
-    Error::all(outputs.iter().filter_map(write).collect())
+    Error::all(picture.write_all(outputs, (&film).into(), &metadata))
 }
 
 /// What the parts say about themselves, in the order of their numbers: sums in f64 depend on the order

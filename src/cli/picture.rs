@@ -216,6 +216,24 @@ impl PictureArguments {
         }
     }
 
+    /// Writes pictures: one that cannot be written must not take the others with it. Returns what failed. What several
+    /// of them show without noise is filtered once.
+    pub(super) fn write_all(
+        &self,
+        pictures: &[PathBuf],
+        films: Films<'_>,
+        metadata: &[(String, String)],
+    ) -> Vec<Error> {
+        let showing = pictures.iter().filter(|path| self.is_denoised([*path])).count();
+        let filter = self.options(films.film).denoiser.filter(|_| showing > 1);
+        // Where it fails, each picture that is not written says why.
+        let denoised = filter.and_then(|it| it.finish(films.film, films.cached).ok());
+        let films = Films { denoised: denoised.as_ref(), ..films };
+        let write =
+            |path: &PathBuf| self.write(path, films, metadata).map(|()| say_written(path)).err();
+        pictures.iter().filter_map(write).collect()
+    }
+
     /// Writes a picture where it was asked to be or, if that fails, into the temporary folder.
     pub(super) fn write(
         &self,

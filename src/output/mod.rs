@@ -74,11 +74,13 @@ pub struct Films<'a> {
     pub film: &'a Film,
     /// What helps to denoise it.
     pub cached: Option<(&'a Film, f32)>,
+    /// The picture without noise, where that was made for several files.
+    pub denoised: Option<&'a Image>,
 }
 
 impl<'a> From<&'a Film> for Films<'a> {
     fn from(film: &'a Film) -> Self {
-        Self { film, cached: None }
+        Self { film, cached: None, denoised: None }
     }
 }
 
@@ -242,10 +244,11 @@ fn balanced(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
 }
 
 /// The film's picture, without noise if that is asked for.
-fn shown(options: &PictureOptions, Films { film, cached }: Films<'_>) -> Result<Image> {
-    match options.denoiser {
-        Some(filter) => filter.finish(film, cached),
-        None => Ok(film.without_gaps().image()),
+fn shown(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
+    match (options.denoiser, films.denoised) {
+        (Some(_), Some(image)) => Ok(image.clone()),
+        (Some(filter), None) => filter.finish(films.film, films.cached),
+        (None, _) => Ok(films.film.without_gaps().image()),
     }
 }
 

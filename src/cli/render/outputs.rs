@@ -94,15 +94,18 @@ pub(super) fn write(
     record: &Record<'_>,
     cached: Option<(&Film, f32)>,
 ) -> Vec<Error> {
-    let films = Films { film: record.film, cached };
+    let films = Films { film: record.film, cached, denoised: None };
     let metadata = record.metadata();
-    let write = |path: &PathBuf| match arguments.part {
-        Some(_) => assignment.write_part(path, driver, record),
-        None => arguments.picture.write(path, films, &metadata),
+    let (picture, outputs) = (&arguments.picture, &arguments.outputs);
+    let write_part = |path: &PathBuf| {
+        assignment.write_part(path, driver, record).map(|()| say_written(path)).err()
     };
-    let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
-    let mut failures: Vec<Error> = arguments.outputs.iter().filter_map(write_and_say).collect();
-    failures.extend(arguments.frame_of_video.as_ref().and_then(|path| write(path).err()));
+    let mut failures = match arguments.part {
+        Some(_) => outputs.iter().filter_map(write_part).collect(),
+        None => picture.write_all(outputs, films, &metadata),
+    };
+    let frame = arguments.frame_of_video.as_ref();
+    failures.extend(frame.and_then(|path| picture.write(path, films, &metadata).err()));
     if let Some(path) = &arguments.json {
         let written = record::write_json(path, &record.to_json());
         failures.extend(written.map(|()| say_written(path)).err());
