@@ -7,9 +7,9 @@ use crate::error::Decoded;
 use crate::memory;
 use crate::scene::StartView;
 
-/// Most bytes that a pixel of the picture takes: films of its exact and of its cached light, copies of both that are
-/// shown and that will be, and for a moment the planes of Open Image Denoise (measured: 830; built-in filter: 630).
-pub(super) const BYTES_PER_PIXEL: u64 = 840;
+/// Bytes that a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
+/// and that will be, and the denoiser's planes (measured: 630).
+pub(super) const BYTES_PER_PIXEL: u64 = 640;
 
 /// The document under change.
 pub(super) struct Edited {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{Developer, LinearPicture, OverlayTexture, filled};
 use crate::image::Image;
-use crate::render::film::Film;
+use crate::render::film::{Film, Surface};
 use crate::render::gpu::{DeviceFilm, Gpu};
 
 /// Bytes of a pixel's sums, and of its counts.
@@ -22,8 +22,8 @@ impl Developer {
             pixels.par_iter().map(|pixel| pixel.sums().map(|sum| sum as f32)).collect();
         let counts: Vec<[u32; 4]> = pixels.par_iter().map(|p| [p.samples(), 0, 0, 0]).collect();
         let surfaces = (layers && film.has_layers()).then(|| {
-            let sums = film.surface_sums().map(|sums| sums.map(|sum| sum as f32));
-            let surfaces: Vec<[f32; 8]> = sums.collect();
+            let sums = |surface: &Surface| surface.sums().map(|sum| sum as f32);
+            let surfaces: Vec<[f32; 8]> = film.surfaces().par_iter().map(sums).collect();
             self.buffer(bytemuck::cast_slice(&surfaces))
         });
         LinearPicture::fixed(DeviceFilm {

@@ -136,10 +136,8 @@ pub fn write_film(path: &Path, facts: &FilmFacts, film: &Film, skipped: u32) -> 
         for row in film.pixels().chunks(width) {
             put(row.iter().flat_map(|pixel| pixel_words(pixel, skipped)).collect())?;
         }
-        let pixels = if film.has_layers() { film.pixels() } else { &[] };
-        for first in (0..pixels.len()).step_by(width) {
-            let row = (first..first + width).flat_map(|index| film.surface_sums_of(index));
-            put(row.map(f64::to_bits).collect())?;
+        for row in film.surfaces().chunks(width) {
+            put(row.iter().flat_map(|surface| surface.sums().map(f64::to_bits)).collect())?;
         }
         file.write_all(&digest.value().to_le_bytes())
     })
@@ -221,12 +219,11 @@ fn decode(bytes: &[u8]) -> Decoded<(FilmFacts, Film)> {
         return Err(DAMAGED.into());
     }
     memory::check(content.len() as u64)?;
-    let pixels: Vec<Pixel> = in_rows(of_pixels).map(pixel_of_words).collect();
-    let surface = |(words, pixel): ([u64; SURFACE_WORDS], &Pixel)| {
-        Surface::of_sums(words.map(f64::from_bits), pixel.samples())
-    };
-    let surfaces = in_rows(of_surfaces).zip(&pixels).map(surface).collect();
-    let film = Film::of_pixels([width, height], pixels, surfaces);
+    let film = Film::of_pixels(
+        [width, height],
+        in_rows(of_pixels).map(pixel_of_words).collect(),
+        in_rows(of_surfaces).map(|words| Surface::of_sums(words.map(f64::from_bits))).collect(),
+    );
     Ok((header.facts, film))
 }
 

@@ -1,6 +1,6 @@
 //! What the samples add up to.
 
-use glam::Vec3;
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::color::luminance;
@@ -20,24 +20,24 @@ pub struct Pixel {
     invalid: u32,
 }
 
-/// What the first surface looks like, when layers are asked for: sums over hits, each divided by the samples of the
-/// pixel. In f32, for each of them stays in its range however many samples there are.
+/// Sums of what the first surface looks like, when layers are asked for; in f64 for the same reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Surface([f32; 8]);
-
-/// Where a surface has the distance. Before the first hit it counts down from zero samples that say nothing
-/// ([`PathResult::is_minor`]).
-const DEPTH: usize = 3;
-/// Where a surface has the number of hits, those included that count as the mean of the others.
-const HITS: usize = 7;
+pub struct Surface {
+    albedo: DVec3,
+    normal: DVec3,
+    /// Sum over hits. Before the first it counts down from zero samples that say nothing ([`PathResult::is_minor`]).
+    depth: f64,
+    /// Those included that count as the mean of the others.
+    hits: f64,
+}
 
 impl Surface {
-    /// Mean albedo, unit normal and distance in metres.
-    fn mean(&self) -> ([f32; 3], [f32; 3], f32) {
-        let [r, g, b, depth, x, y, z, hits] = self.0;
-        let normal = Vec3::new(x, y, z).normalize_or_zero();
-        let depth = if hits > 0.0 { depth.max(0.0) / hits } else { 0.0 };
-        ([r, g, b], normal.to_array(), depth)
+    /// Mean albedo, unit normal and distance in metres, of so many samples of the pixel.
+    fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
+        let albedo = self.albedo / f64::from(samples.max(1));
+        let normal = self.normal.normalize_or_zero();
+        let depth = self.depth.max(0.0) / self.hits.max(1.0);
+        (albedo.as_vec3().to_array(), normal.as_vec3().to_array(), depth as f32)
     }
 }
 
@@ -121,38 +121,46 @@ impl Pixel {
 }
 
 impl Surface {
-    /// Adds to those of `samples` the first hit of one more, or that there was none. One that says nothing counts as
-    /// much as the others on average, those that come first as much as the first that says something.
-    pub fn add(&mut self, samples: u32, result: &PathResult) {
-        let mut sums = self.sums(samples);
-        let (waiting, hits) = ((-sums[DEPTH]).max(0.0).round(), sums[HITS]);
+    /// Adds the first hit of one sample, or that there was none. One that says nothing counts as much as the others
+    /// on average, those that come first as much as the first that says something.
+    pub fn add(&mut self, result: &PathResult) {
+        let waiting = -self.depth.min(0.0);
         if let Some(hit) = result.first_hit {
-            let ([r, g, b], [x, y, z]) = (hit.albedo.to_array(), hit.normal.to_array());
-            let hit = [r, g, b, hit.depth, x, y, z, 1.0];
-            let add = |(sum, own): (&mut f64, f32)| *sum += f64::from(own) * (1.0 + waiting);
-            sums.iter_mut().zip(hit).for_each(add);
-        } else if result.is_minor && hits > 0.0 {
-            sums = sums.map(|sum| sum + sum / hits);
+            let times = 1.0 + waiting;
+            self.albedo += hit.albedo.as_dvec3() * times;
+            self.normal += hit.normal.as_dvec3() * times;
+            self.depth += f64::from(hit.depth) * times + waiting;
+            self.hits += times;
+        } else if !result.is_minor {
+            self.depth += waiting;
+        } else if self.hits > 0.0 {
+            let mean = 1.0 / self.hits;
+            self.albedo += self.albedo * mean;
+            self.normal += self.normal * mean;
+            self.depth += self.depth * mean;
+            self.hits += 1.0;
+        } else {
+            self.depth -= 1.0;
         }
-        sums[DEPTH] += if result.is_minor && hits == 0.0 { -1.0 } else { waiting };
-        *self = Self::of_sums(sums, samples.saturating_add(1));
     }
 
-    /// Adds to those of `samples` what `more` samples of another one met.
-    pub(super) fn add_all(&mut self, samples: u32, other: &Self, more: u32) {
-        let mut sums = self.sums(samples);
-        sums.iter_mut().zip(other.sums(more)).for_each(|(sum, more)| *sum += more);
-        *self = Self::of_sums(sums, samples.saturating_add(more));
+    /// Adds what all samples of another one met.
+    pub(super) fn add_all(&mut self, other: &Self) {
+        self.albedo += other.albedo;
+        self.normal += other.normal;
+        self.depth += other.depth;
+        self.hits += other.hits;
     }
 
-    /// Of sums over the first hits of so many samples: albedo, depth, normal and the number of hits.
-    pub(crate) fn of_sums(sums: [f64; 8], samples: u32) -> Self {
-        Self(sums.map(|sum| (sum / f64::from(samples.max(1))) as f32))
+    /// Of sums over first hits: albedo, depth, normal and their number.
+    pub(crate) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
+        Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits }
     }
 
     /// What [`Self::of_sums`] takes.
-    pub(crate) fn sums(&self, samples: u32) -> [f64; 8] {
-        self.0.map(|mean| f64::from(mean) * f64::from(samples))
+    pub(crate) fn sums(&self) -> [f64; 8] {
+        let ([r, g, b], [x, y, z]) = (self.albedo.to_array(), self.normal.to_array());
+        [r, g, b, self.depth, x, y, z, self.hits]
     }
 }
 
@@ -196,9 +204,6 @@ impl Film {
     /// A copy that does not count the first `skipped` samples of every pixel, which [`Self::skip`] did.
     pub(crate) fn without_skipped(&self, skipped: u32) -> Self {
         let mut film = self.clone();
-        for (pixel, surface) in film.pixels.iter_mut().zip(&mut film.surfaces) {
-            *surface = Surface::of_sums(surface.sums(pixel.samples), pixel.samples - skipped);
-        }
         film.pixels.iter_mut().for_each(|pixel| pixel.samples -= skipped);
         film
     }
@@ -252,23 +257,18 @@ impl Film {
     /// Adds the samples of another film of the same size and with the same layers: each counts as much
     /// as any of this one's.
     pub(crate) fn add_film(&mut self, other: &Self) {
-        for (index, more) in other.pixels.iter().enumerate() {
-            let own = self.pixels[index].samples;
-            self.pixels[index].add_all(more);
-            if let Some(surface) = self.surfaces.get_mut(index) {
-                surface.add_all(own, &other.surfaces[index], more.samples);
-            }
-        }
+        self.pixels.iter_mut().zip(&other.pixels).for_each(|(pixel, more)| pixel.add_all(more));
+        self.surfaces.iter_mut().zip(&other.surfaces).for_each(|(all, more)| all.add_all(more));
     }
 
     /// Adds one sample to the pixel in column `x` of row `y`.
     #[cfg(test)]
     pub(crate) fn add(&mut self, x: u32, y: u32, result: &PathResult) {
         let index = (y * self.width + x) as usize;
-        if let Some(surface) = self.surfaces.get_mut(index) {
-            surface.add(self.pixels[index].samples, result);
-        }
         self.pixels[index].add(result);
+        if let Some(surface) = self.surfaces.get_mut(index) {
+            surface.add(result);
+        }
     }
 
     /// Whether albedo, normal and depth are kept.
@@ -279,18 +279,13 @@ impl Film {
     /// Mean albedo, unit normal and distance in metres of what a pixel sees; `None` without layers, and where it
     /// has met no surface.
     pub(crate) fn surface_of(&self, index: usize) -> Option<([f32; 3], [f32; 3], f32)> {
-        self.surfaces.get(index).filter(|surface| surface.0[HITS] > 0.0).map(Surface::mean)
+        let surface = self.surfaces.get(index).filter(|surface| surface.hits > 0.0)?;
+        Some(surface.mean(self.pixels.get(index)?.samples))
     }
 
-    /// Sums over first hits as [`Surface::of_sums`] takes them, row after row; none unless layers are kept.
-    pub(crate) fn surface_sums(&self) -> impl IndexedParallelIterator<Item = [f64; 8]> {
-        let pixels = self.surfaces.par_iter().zip(&self.pixels);
-        pixels.map(|(surface, pixel)| surface.sums(pixel.samples))
-    }
-
-    /// The same of one pixel, which has layers.
-    pub(crate) fn surface_sums_of(&self, index: usize) -> [f64; 8] {
-        self.surfaces[index].sums(self.pixels[index].samples)
+    /// Sums of first hits, row after row; empty unless layers are kept.
+    pub(crate) fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
     /// The pixels, row after row.
@@ -372,8 +367,11 @@ impl Film {
     /// Share of each pixel's samples that met a surface, in `[0,1]`: what the map does not show behind. `None` unless
     /// layers were asked for.
     pub fn alpha(&self) -> Option<Vec<f32>> {
-        let share = |surface: &Surface| surface.0[HITS].clamp(0.0, 1.0);
-        self.has_layers().then(|| self.surfaces.iter().map(share).collect())
+        let share = |(surface, pixel): (&Surface, &Pixel)| {
+            (surface.hits / f64::from(pixel.samples.max(1))).clamp(0.0, 1.0) as f32
+        };
+        let pixels = self.surfaces.iter().zip(&self.pixels);
+        self.has_layers().then(|| pixels.map(share).collect())
     }
 
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing
@@ -383,7 +381,8 @@ impl Film {
             return None;
         }
         // Each list gets the room that it takes and no more.
-        let means = || self.surfaces.iter().map(Surface::mean);
+        let pixels = self.surfaces.iter().zip(&self.pixels);
+        let means = || pixels.clone().map(|(surface, pixel)| surface.mean(pixel.samples));
         Some(SurfaceLayers {
             albedo: means().map(|(albedo, _, _)| albedo).collect(),
             normal: means().map(|(_, normal, _)| normal).collect(),
@@ -479,10 +478,10 @@ impl FilmPixel<'_> {
 
     /// Adds one sample.
     pub(super) fn add(&mut self, result: &PathResult) {
-        if let Some(surface) = &mut self.surface {
-            surface.add(self.pixel.samples, result);
-        }
         self.pixel.add(result);
+        if let Some(surface) = &mut self.surface {
+            surface.add(result);
+        }
     }
 }
 
@@ -518,37 +517,5 @@ mod tests {
             tile.pixels().for_each(|(_, mut pixel)| pixel.replace(&sample(1.0, 3.0)));
         }
         assert_eq!(film, expected);
-    }
-
-    #[test]
-    fn surfaces_keep_their_means_over_many_samples() {
-        let mut surface = Surface::default();
-        let hit = |albedo: f32, depth: f32| PathResult {
-            first_hit: Some(crate::path::FirstHit {
-                normal: Vec3::Z,
-                albedo: Vec3::splat(albedo),
-                depth,
-            }),
-            ..PathResult::default()
-        };
-        let count = 300_000;
-        for sample in 0..count {
-            let result = match sample % 3 {
-                0 => hit(0.3, 7.0),
-                1 => hit(0.9, 8.0),
-                _ => PathResult::default(),
-            };
-            surface.add(sample, &result);
-        }
-        let ([albedo, ..], normal, depth) = surface.mean();
-        assert!((albedo - 0.4).abs() < 1e-5, "{albedo}");
-        assert!((depth / 7.5 - 1.0).abs() < 1e-4, "{depth}");
-        assert!((normal[2] - 1.0).abs() < 1e-6, "{normal:?}");
-        // A surface that is always the same keeps it to the bit.
-        let mut same = Surface::default();
-        (0..count).for_each(|sample| same.add(sample, &hit(0.3, 7.1)));
-        assert_eq!(same.mean(), ([0.3; 3], [0.0, 0.0, 1.0], 7.1));
-        let again = Surface::of_sums(surface.sums(count), count);
-        assert_eq!(again, surface, "sums hold it to the bit");
     }
 }

@@ -15,11 +15,10 @@ impl Film {
             let (mut pixel, mut surface) = (Pixel::default(), Surface::default());
             for y in top..(top + every).min(self.height) {
                 for from in (left..(left + every).min(self.width)).map(|x| y * self.width + x) {
-                    let more = &self.pixels[from as usize];
-                    if let Some(other) = self.surfaces.get(from as usize) {
-                        surface.add_all(pixel.samples(), other, more.samples());
+                    pixel.add_all(&self.pixels[from as usize]);
+                    if let Some(more) = self.surfaces.get(from as usize) {
+                        surface.add_all(more);
                     }
-                    pixel.add_all(more);
                 }
             }
             (pixel, surface)

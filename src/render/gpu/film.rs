@@ -120,7 +120,7 @@ impl Sums {
             rays += buffers.read(&parts, |read| {
                 let rays = take_pixels(pixels, &read[..3], self.factors().map(f64::recip));
                 if let (Some(surfaces), [_, _, _, high, low]) = (&mut surfaces, read) {
-                    take_surfaces(surfaces, pixels, high, low);
+                    take_surfaces(surfaces, high, low);
                 }
                 rays
             })?;
@@ -151,9 +151,7 @@ impl Sums {
         }
         for (piece, surfaces) in film.surfaces.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * SURFACE_BYTES;
-            let pixels = &film.pixels[piece * PIECE_PIXELS..];
-            let sums = |(surface, pixel): (&Surface, &Pixel)| surface.sums(pixel.samples());
-            let (high, low) = split(surfaces.iter().zip(pixels).map(sums));
+            let (high, low) = split(surfaces.iter().map(Surface::sums));
             buffers.write(SURFACES[0], at, bytemuck::cast_slice(&high));
             buffers.write(SURFACES[1], at, bytemuck::cast_slice(&low));
             buffers.finish_copies()?;
@@ -194,11 +192,11 @@ fn take_pixels(pixels: &mut [Pixel], read: &[&[u8]], factors: [f64; 4]) -> u64 {
         .sum()
 }
 
-fn take_surfaces(surfaces: &mut [Surface], pixels: &[Pixel], high: &[u8], low: &[u8]) {
+fn take_surfaces(surfaces: &mut [Surface], high: &[u8], low: &[u8]) {
     let high: &[[f32; 8]] = bytemuck::cast_slice(high);
     let low: &[[f32; 8]] = bytemuck::cast_slice(low);
-    for (((surface, pixel), high), low) in surfaces.iter_mut().zip(pixels).zip(high).zip(low) {
-        *surface = Surface::of_sums(joined(*high, *low), pixel.samples());
+    for ((surface, high), low) in surfaces.iter_mut().zip(high).zip(low) {
+        *surface = Surface::of_sums(joined(*high, *low));
     }
 }
 
@@ -232,7 +230,7 @@ mod tests {
     #[test]
     fn surfaces_keep_their_order() {
         let sums = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
-        let surface = Surface::of_sums(sums, 4);
-        assert_eq!(surface.sums(4), sums);
+        let surface = Surface::of_sums(sums);
+        assert_eq!(surface.sums(), sums);
     }
 }
