@@ -1,10 +1,14 @@
 //! What operating systems are asked for directly, each in a file of its own with the same functions.
 
+#[cfg(not(any(unix, windows)))]
+mod bare;
 #[cfg(unix)]
 mod unix;
 #[cfg(windows)]
 mod windows;
 
+#[cfg(not(any(unix, windows)))]
+pub(crate) use bare::*;
 #[cfg(unix)]
 pub(crate) use unix::*;
 #[cfg(windows)]

@@ -11,6 +11,9 @@ CORNERS = 32
 
 def write(scene, path):
     """Writes what a render of the scene would show, at its frame."""
+    # The export leaves edit mode, sculpting and the like.
+    active = bpy.context.view_layer.objects.active
+    mode = active.mode if active else "OBJECT"
     lamps = [make_surface(scene, lamp) for lamp in area_lights(scene)]
     wanted = dict(
         export_format="GLB",
@@ -38,6 +41,8 @@ def write(scene, path):
             bpy.data.objects.remove(surface)
             bpy.data.meshes.remove(mesh)
             bpy.data.materials.remove(material)
+        if active and active.mode != mode:
+            bpy.ops.object.mode_set(mode=mode)
 
 
 def area_lights(scene):

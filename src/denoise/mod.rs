@@ -4,6 +4,10 @@ pub(crate) mod a_trous;
 pub(crate) mod edges;
 pub(crate) mod guides;
 pub(crate) mod light;
+#[cfg(any(unix, windows))]
+mod oidn;
+#[cfg(not(any(unix, windows)))]
+#[path = "no_oidn.rs"]
 mod oidn;
 mod samples;
 

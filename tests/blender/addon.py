@@ -172,6 +172,13 @@ def main(zip_file, program):
     sky_node.sun_elevation += 0.1
     assert world_time() > first, "a changed world is written"
 
+    # Whoever edits a mesh goes on with that.
+    bpy.context.view_layer.objects.active = bpy.data.objects["box"]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.lightgrid.send(opens=False)
+    assert bpy.context.mode == "EDIT_MESH", bpy.context.mode
+    bpy.ops.object.mode_set(mode="OBJECT")
+
     # Opened, and sent again whenever the file is saved.
     bpy.context.preferences.addons[MODULE].preferences.program = program
     assert bpy.ops.lightgrid.send() == {"FINISHED"}

@@ -1,4 +1,4 @@
-//! Unix systems of which nothing more is known.
+//! What is asked of a system of which nothing more is known.
 
 use std::ops::Range;
 
