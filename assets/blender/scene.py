@@ -3,7 +3,6 @@
 import math
 
 import bpy
-from mathutils import Matrix
 
 # Corners of a round area light.
 CORNERS = 32
@@ -15,6 +14,11 @@ def write(scene, path):
     active = bpy.context.view_layer.objects.active
     mode = active.mode if active else "OBJECT"
     lamps = [make_surface(scene, lamp) for lamp in area_lights(scene)]
+    cameras = [thing for thing in scene.objects if thing.type == "CAMERA" and thing.data.dof.use_dof]
+    # What another file owns cannot be changed, and what has a lens already keeps it.
+    lenses = {thing.data: lens_of(thing) for thing in cameras if not thing.data.library and "lens" not in thing.data}
+    for camera, lens in lenses.items():
+        camera["lens"] = lens
     wanted = dict(
         export_format="GLB",
         use_active_scene=True,
@@ -41,8 +45,20 @@ def write(scene, path):
             bpy.data.objects.remove(surface)
             bpy.data.meshes.remove(mesh)
             bpy.data.materials.remove(material)
+        for camera in lenses:
+            del camera["lens"]
         if active and active.mode != mode:
             bpy.ops.object.mode_set(mode=mode)
+
+
+def lens_of(camera):
+    """Radius of the lens and distance of what is sharp, in metres: glTF has no lens, lightgrid finds it in extras."""
+    focus = camera.data.dof
+    distance = focus.focus_distance
+    if focus.focus_object:
+        place = camera.matrix_world.normalized().inverted() @ focus.focus_object.matrix_world.translation
+        distance = -place.z
+    return {"radius": camera.data.lens / 1000.0 / (2.0 * focus.aperture_fstop), "focus": max(distance, 1e-3)}
 
 
 def area_lights(scene):

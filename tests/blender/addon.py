@@ -85,6 +85,15 @@ def lamps():
     light("SPOT", 80, (1, -1, 2), (0.2, 0.3, 0), shadow_soft_size=0.0, spot_blend=0.0)
 
 
+def lens():
+    """The corner of the room is out of focus."""
+    sun()
+    eye = bpy.context.scene.camera
+    eye.data.dof.use_dof = True
+    eye.data.dof.aperture_fstop = 0.2
+    eye.data.dof.focus_object = bpy.data.objects["box"]
+
+
 def sun():
     _, background = room(has_window=True)
     background.inputs["Color"].default_value = (0.1, 0.2, 0.4, 1)
@@ -147,7 +156,7 @@ def main(zip_file, program):
         bpy.ops.lightgrid.send()
     except RuntimeError as error:
         found["without a program"] = str(error)
-    rooms = {"lamps": lamps, "sun": sun, "picture": lambda: picture(package), "sky": sky}
+    rooms = {"lamps": lamps, "sun": sun, "lens": lens, "picture": lambda: picture(package), "sky": sky}
     for name, make in rooms.items():
         make()
         before = sorted(thing.name for thing in bpy.data.objects)

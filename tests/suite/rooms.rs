@@ -161,11 +161,11 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6465),
     ("report", 3156),
     ("sampler", 145),
-    ("scene", 10150),
+    ("scene", 10155),
     ("shaders", 6060),
     ("sources", 119),
     ("stability", 1891),
-    ("system", 335),
+    ("system", 381),
     ("terminal", 48),
     ("tone", 188),
 ];

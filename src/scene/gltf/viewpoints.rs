@@ -54,6 +54,7 @@ pub(super) fn cameras(
         if let Projection::Orthographic { half_height } = &mut camera.projection {
             *half_height = frame.length(*half_height);
         }
+        camera.lens_radius = frame.length(camera.lens_radius);
         camera.focus_distance = frame.length(camera.focus_distance);
         cameras.push((index.value(), camera, path));
     }
@@ -91,13 +92,18 @@ fn camera(
     }
     let world_from_camera =
         if world_from_camera.is_finite() { world_from_camera } else { DAffine3::IDENTITY };
-    Camera {
-        name,
-        world_from_camera: world_from_camera.as_affine3a(),
-        projection,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
-    }
+    let [lens_radius, focus_distance] = lens(&source.extras).unwrap_or([0.0, 1.0]);
+    let world_from_camera = world_from_camera.as_affine3a();
+    Camera { name, world_from_camera, projection, lens_radius, focus_distance }
+}
+
+/// Radius of the lens, and the distance at which the picture is sharp, in metres. glTF has neither, so they come from
+/// `extras`: `{"lens": {"radius": 0.01, "focus": 2.5}}`.
+fn lens(extras: &json::Extras) -> Option<[f32; 2]> {
+    let keys: serde_json::Value = serde_json::from_str(extras.as_ref()?.get()).ok()?;
+    let length = |key| keys["lens"][key].as_f64().map(|metres| metres as f32);
+    let is_length = |metres: &f32| metres.is_finite() && *metres > 0.0;
+    Some([length("radius").filter(is_length)?, length("focus").filter(is_length)?])
 }
 
 /// `KHR_lights_punctual` lights of the shown nodes. Candela and lux are taken as the renderer's

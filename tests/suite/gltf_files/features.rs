@@ -556,7 +556,8 @@ fn cameras_and_lights() {
         r#""extensionsUsed":["KHR_lights_punctual"],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
         "cameras":[{"type":"orthographic","orthographic":{"xmag":2,"ymag":1,"znear":0,"zfar":9}},
-        {"type":"perspective","name":"Main","perspective":{"yfov":0.5,"znear":0.1}}],
+        {"type":"perspective","name":"Main","perspective":{"yfov":0.5,"znear":0.1},
+        "extras":{"lens":{"radius":0.01,"focus":2.5}}}],
         "extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","color":[1,0.5,0],"intensity":4},
         {"type":"spot","name":"Lamp","range":3,"spot":{"outerConeAngle":0.5}}]}},
         "nodes":[{"mesh":0},{"camera":1,"translation":[0,0,5]},{"camera":0,"name":"Plan"},
@@ -564,9 +565,9 @@ fn cameras_and_lights() {
         {"extensions":{"KHR_lights_punctual":{"light":1}},"translation":[1,2,3]}]"#,
     );
     let [plan, main] = &scene.cameras[..] else { panic!("two cameras") };
-    assert_eq!(plan.name, "Plan");
+    assert_eq!((plan.name.as_str(), plan.lens_radius), ("Plan", 0.0));
     assert_eq!(plan.projection, Projection::Orthographic { half_height: 1.0 });
-    assert_eq!(main.name, "Main");
+    assert_eq!((main.name.as_str(), main.lens_radius, main.focus_distance), ("Main", 0.01, 2.5));
     assert_eq!(main.projection, Projection::Perspective { fov_y_radians: 0.5 });
     assert_eq!(Vec3::from(main.world_from_camera.translation), Vec3::new(0.0, 0.0, 5.0));
     let [sun, lamp] = &scene.lights[..] else { panic!("two lights") };
