@@ -20,10 +20,21 @@ def source_of(socket):
     return socket.links[0].from_node if socket.is_linked else None
 
 
+def tree_of(world):
+    """The nodes of a world; None of one without. Since Blender 5 all have them."""
+    has_nodes = bpy.app.version >= (5, 0, 0) or world.use_nodes
+    return world.node_tree if has_nodes else None
+
+
+def background_of(world):
+    """What a world's surface is; None if nothing is."""
+    output = tree_of(world).get_output_node("CYCLES")
+    return output and source_of(output.inputs["Surface"])
+
+
 def picture_of(world):
     """Image, angle about Z in radians and strength of a world that is one lat-long picture; None of any other."""
-    output = world.node_tree and world.node_tree.get_output_node("CYCLES")
-    background = output and source_of(output.inputs["Surface"])
+    background = background_of(world)
     if not background or background.type != "BACKGROUND" or background.inputs["Strength"].is_linked:
         return None
     texture = source_of(background.inputs["Color"])
@@ -40,10 +51,9 @@ def colour_of(world):
     """Radiance of a world of one colour, RGB; None of any other."""
     if not world:
         return (0.0, 0.0, 0.0)
-    output = world.node_tree and world.node_tree.get_output_node("CYCLES")
-    if not output:
-        return (0.0, 0.0, 0.0) if world.node_tree else tuple(world.color)
-    background = source_of(output.inputs["Surface"])
+    if not tree_of(world):
+        return tuple(world.color)
+    background = background_of(world)
     if not background:
         return (0.0, 0.0, 0.0)
     if background.type != "BACKGROUND":
@@ -81,7 +91,7 @@ def digest(world):
     found = hashlib.sha256()
     if world:
         found.update(repr(tuple(world.color)).encode())
-        describe(world.node_tree, found, set())
+        describe(tree_of(world), found, set())
     return found.hexdigest()
 
 
@@ -156,6 +166,8 @@ def turned(image, angle, strength):
 
 def bake(world, path):
     """Renders the map of a world by Cycles, in a scene of its own."""
+    if not hasattr(bpy.types.Scene, "cycles"):
+        raise RuntimeError("the world is rendered by Cycles, whose add-on is switched off")
     scene = bpy.data.scenes.new("lightgrid world")
     camera = bpy.data.cameras.new("lightgrid world")
     eye = bpy.data.objects.new("lightgrid world", camera)
