@@ -1,5 +1,6 @@
 """Opens the scene in lightgrid, or sends it again to a lightgrid that is open."""
 
+import functools
 import os
 import shutil
 import subprocess
@@ -14,21 +15,22 @@ from bpy.props import BoolProperty, StringProperty
 from . import scene as scene_file
 from . import world as world_file
 
-# Seconds in which a program that cannot start has ended.
+# Seconds after which a program that fails to start has ended.
 STARTING = 2.0
 
 
 class Sent:
-    """What was sent last, and the lightgrid that shows it."""
+    """What was sent last, and the lightgrid that shows each folder."""
 
     folder = None
     world = None
-    process = None
+    processes = {}
     message = ""
 
     @classmethod
-    def is_open(cls):
-        return cls.process is not None and cls.process.poll() is None
+    def is_open(cls, folder):
+        process = cls.processes.get(folder)
+        return process is not None and process.poll() is None
 
 
 def program_of(preferences):
@@ -52,7 +54,17 @@ def folder_of(scene):
     return os.path.join(bpy.app.tempdir or tempfile.gettempdir(), "lightgrid", name)
 
 
-def send(context, all_of_it):
+def replace(source, target):
+    """Puts a file in the place of another, which on Windows fails for a moment while somebody reads that."""
+    for _ in range(20):
+        try:
+            return os.replace(source, target)
+        except PermissionError:
+            time.sleep(0.1)
+    return os.replace(source, target)
+
+
+def send(context, writes_world):
     """Writes scene and world, each in one step. Returns the folder, and seconds that it took."""
     start = time.monotonic()
     context.view_layer.update()
@@ -61,13 +73,15 @@ def send(context, all_of_it):
     os.makedirs(unfinished, exist_ok=True)
     try:
         world = world_file.digest(context.scene.world)
-        if all_of_it or (Sent.folder, Sent.world) != (folder, world):
+        map_file = os.path.join(folder, "world.exr")
+        is_there = (Sent.folder, Sent.world) == (folder, world) and os.path.isfile(map_file)
+        if writes_world or not is_there:
             path = os.path.join(unfinished, "world.exr")
             world_file.write(context.scene.world, path)
-            os.replace(path, os.path.join(folder, "world.exr"))
+            replace(path, map_file)
         path = os.path.join(unfinished, "scene.glb")
         scene_file.write(context.scene, path)
-        os.replace(path, os.path.join(folder, "scene.glb"))
+        replace(path, os.path.join(folder, "scene.glb"))
         Sent.folder, Sent.world = folder, world
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
@@ -78,8 +92,10 @@ def arguments(scene, folder):
     """What lightgrid is called with."""
     names = [os.path.join(folder, name) for name in ("scene.glb", "world.exr")]
     found = ["view", names[0], "--env", names[1], "--lamps", "watts"]
-    if scene.camera and scene.camera.type == "CAMERA" and not scene.camera.hide_render:
-        found += ["--camera", scene.camera.data.name]
+    camera = scene.camera
+    # glTF has no panoramas.
+    if camera and camera.type == "CAMERA" and not camera.hide_render and camera.data.type != "PANO":
+        found += ["--camera", camera.data.name]
     return found
 
 
@@ -88,16 +104,19 @@ def start(program, scene, folder):
     detached = {"creationflags": 8} if sys.platform == "win32" else {"start_new_session": True}
     with open(os.path.join(folder, "lightgrid.log"), "w", encoding="utf-8") as log:
         command = [program, *arguments(scene, folder)]
-        Sent.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=folder, **detached)
-    bpy.app.timers.register(check, first_interval=STARTING)
+        Sent.processes[folder] = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=tempfile.gettempdir(), **detached
+        )
+    bpy.app.timers.register(functools.partial(check, folder), first_interval=STARTING)
 
 
-def check():
+def check(folder):
     """Says why lightgrid has ended at once, if it has."""
-    if Sent.process and Sent.process.poll():
-        with open(os.path.join(Sent.folder, "lightgrid.log"), encoding="utf-8", errors="replace") as log:
+    process = Sent.processes[folder]
+    if process.poll():
+        with open(os.path.join(folder, "lightgrid.log"), encoding="utf-8", errors="replace") as log:
             lines = [line.strip() for line in log if line.strip()]
-        Sent.message = lines[-1] if lines else f"lightgrid ended with status {Sent.process.returncode}"
+        Sent.message = lines[-1] if lines else f"lightgrid ended with status {process.returncode}"
         redraw()
 
 
@@ -114,32 +133,37 @@ class LIGHTGRID_OT_send(bpy.types.Operator):
     bl_idname = "lightgrid.send"
     bl_label = "Open in lightgrid"
 
-    all_of_it: BoolProperty(
+    writes_world: BoolProperty(
         name="World Too",
-        description="Write the world even if it seems to be as it was",
+        description="Write the world again even if it seems unchanged",
         options={"SKIP_SAVE"},
     )
     opens: BoolProperty(
         name="Open",
-        description="Start lightgrid if none shows the scene",
+        description="Start lightgrid unless it already shows the scene",
         default=True,
         options={"SKIP_SAVE"},
     )
 
     def execute(self, context):
+        if bpy.app.is_job_running("RENDER"):
+            self.report({"WARNING"}, "Blender is rendering: send the scene after that")
+            return {"CANCELLED"}
         program = program_of(context.preferences.addons[__package__].preferences)
         if self.opens and not os.path.isfile(program):
             missing = f"There is no {program}" if program else "lightgrid is not found"
             self.report({"ERROR"}, f"{missing}: choose the program in the preferences of the add-on")
             return {"CANCELLED"}
-        was_open = Sent.is_open() and Sent.folder == folder_of(context.scene)
+        was_open = Sent.is_open(folder_of(context.scene))
         try:
-            folder, seconds = send(context, self.all_of_it)
+            folder, seconds = send(context, self.writes_world)
             if self.opens and not was_open:
                 start(program, context.scene, folder)
-        except (OSError, RuntimeError) as error:
-            Sent.message = str(error)
-            self.report({"ERROR"}, f"The scene could not be sent to lightgrid: {error}")
+        except Exception as error:
+            # Blender adds where in its own code that was.
+            lines = [line.strip() for line in str(error).splitlines() if line.strip() and "Location:" not in line]
+            Sent.message = lines[-1] if lines else type(error).__name__
+            self.report({"ERROR"}, f"The scene could not be sent to lightgrid: {Sent.message}")
             return {"CANCELLED"}
         Sent.message = f"Sent in {seconds:.1f} s"
         self.report({"INFO"}, f"{Sent.message}: {folder}")
@@ -156,10 +180,10 @@ class LIGHTGRID_PT_panel(bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         row = layout.row(align=True)
-        is_open = Sent.is_open() and Sent.folder == folder_of(context.scene)
+        is_open = Sent.is_open(folder_of(context.scene))
         label = "Send Again" if is_open else "Open in lightgrid"
         row.operator("lightgrid.send", text=label, icon="LIGHT_SUN")
-        row.operator("lightgrid.send", text="", icon="WORLD").all_of_it = True
+        row.operator("lightgrid.send", text="", icon="WORLD").writes_world = True
         layout.prop(context.window_manager, "lightgrid_sends_when_saving")
         if Sent.message:
             layout.label(text=Sent.message)
@@ -170,7 +194,7 @@ class LightgridPreferences(bpy.types.AddonPreferences):
 
     program: StringProperty(
         name="Program",
-        description="The program lightgrid; empty: the one that is found",
+        description="Path of lightgrid; leave empty to search for it",
         subtype="FILE_PATH",
     )
 
@@ -188,8 +212,13 @@ def draw_menu(menu, _context):
 @persistent
 def send_when_saving(*_):
     context = bpy.context
-    if context.window_manager.lightgrid_sends_when_saving and Sent.is_open():
-        bpy.ops.lightgrid.send(opens=False)
+    if context.window_manager.lightgrid_sends_when_saving and Sent.is_open(folder_of(context.scene)):
+        try:
+            bpy.ops.lightgrid.send(opens=False)
+        except RuntimeError:
+            # The panel says why.
+            pass
+        redraw()
 
 
 CLASSES = (LightgridPreferences, LIGHTGRID_OT_send, LIGHTGRID_PT_panel)
@@ -200,7 +229,7 @@ def register():
         bpy.utils.register_class(kind)
     bpy.types.WindowManager.lightgrid_sends_when_saving = BoolProperty(
         name="Send when saving",
-        description="Whenever the file is saved, a lightgrid that is open gets the scene",
+        description="Send the scene to its open window of lightgrid whenever the file is saved",
         default=True,
     )
     bpy.types.TOPBAR_MT_render.append(draw_menu)

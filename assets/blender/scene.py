@@ -1,24 +1,29 @@
-"""Writes a scene as binary glTF, with area lights as surfaces that shine."""
+"""Writes a scene as binary glTF, with area lights as surfaces that emit light."""
 
 import math
 
 import bpy
+from mathutils import Color
 
 # Corners of a round area light.
 CORNERS = 32
 
 
 def write(scene, path):
-    """Writes what a render of the scene would show, at its frame."""
-    # The export leaves edit mode, sculpting and the like.
-    active = bpy.context.view_layer.objects.active
-    mode = active.mode if active else "OBJECT"
-    lamps = [make_surface(scene, lamp) for lamp in area_lights(scene)]
-    cameras = [thing for thing in scene.objects if thing.type == "CAMERA" and thing.data.dof.use_dof]
-    # What another file owns cannot be changed, and what has a lens already keeps it.
-    lenses = {thing.data: lens_of(thing) for thing in cameras if not thing.data.library and "lens" not in thing.data}
-    for camera, lens in lenses.items():
-        camera["lens"] = lens
+    """Writes what a render of the scene would show, at its frame; the scene is left as it was."""
+    if not hasattr(bpy.types, "EXPORT_SCENE_OT_gltf"):
+        raise RuntimeError("Blender's add-on glTF 2.0 is switched off")
+    undo = []
+    try:
+        prepare(scene, undo)
+        export(path)
+    finally:
+        for step in reversed(undo):
+            step()
+
+
+def export(path):
+    """Calls the exporter with the options that this Blender knows."""
     wanted = dict(
         export_format="GLB",
         use_active_scene=True,
@@ -36,44 +41,81 @@ def write(scene, path):
         export_extras=True,
     )
     known = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
-    try:
-        bpy.ops.export_scene.gltf(filepath=path, **{name: value for name, value in wanted.items() if name in known})
-    finally:
-        for surface in lamps:
-            mesh = surface.data
-            material = mesh.materials[0]
-            bpy.data.objects.remove(surface)
-            bpy.data.meshes.remove(mesh)
-            bpy.data.materials.remove(material)
-        for camera in lenses:
-            del camera["lens"]
-        if active and active.mode != mode:
-            bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.export_scene.gltf(filepath=path, **{name: value for name, value in wanted.items() if name in known})
 
 
-def lens_of(camera):
-    """Radius of the lens and distance of what is sharp, in metres: glTF has no lens, lightgrid finds it in extras."""
-    focus = camera.data.dof
+def prepare(scene, undo):
+    """Changes the scene for the export; `undo` gets a function for each change."""
+    active = bpy.context.view_layer.objects.active
+    if active and active.mode != "OBJECT":
+        # The export leaves edit mode, sculpting and the like.
+        mode = active.mode
+        undo.append(lambda: bpy.ops.object.mode_set(mode=mode))
+    shown = rendered(bpy.context.view_layer.layer_collection, set())
+    for thing in scene.objects:
+        if thing not in shown and not thing.hide_render:
+            set_for_export(thing, "hide_render", True, undo)
+    for thing in [thing for thing in scene.objects if thing in shown and not thing.hide_render]:
+        if thing.type == "CAMERA":
+            prepare_camera(scene, thing, undo)
+        elif thing.type == "LIGHT" and thing.data.type == "AREA":
+            # Portals only guide the samples of Cycles.
+            if not getattr(getattr(thing.data, "cycles", None), "is_portal", False):
+                make_surface(scene, thing, undo)
+        elif thing.type == "LIGHT" and getattr(thing.data, "use_temperature", False) and not thing.data.library:
+            # Blender's exporter fails at it.
+            colour = [own * warm for own, warm in zip(thing.data.color, thing.data.temperature_color)]
+            set_for_export(thing.data, "color", colour, undo)
+            set_for_export(thing.data, "use_temperature", False, undo)
+
+
+def rendered(layer, found):
+    """Objects of the collections that a render shows."""
+    if not layer.collection.hide_render:
+        if not layer.exclude:
+            found.update(layer.collection.objects)
+        for child in layer.children:
+            rendered(child, found)
+    return found
+
+
+def set_for_export(owner, name, value, undo):
+    """Gives a property another value until the export has ended."""
+    before = getattr(owner, name)
+    before = tuple(before) if isinstance(before, Color) else before
+    undo.append(lambda: setattr(owner, name, before))
+    setattr(owner, name, value)
+
+
+def prepare_camera(scene, thing, undo):
+    """Puts the lens of a camera into its extras, where lightgrid finds it: glTF has no lens."""
+    if thing == scene.camera and thing.data.users > 1 and not thing.data.library:
+        # Its name is to be the name of one camera.
+        shared, name = thing.data, thing.data.name
+        set_for_export(shared, "name", "lightgrid others", undo)
+        own = shared.copy()
+        undo.append(lambda: bpy.data.cameras.remove(own))
+        own.name = name
+        set_for_export(thing, "data", own, undo)
+    camera = thing.data
+    if camera.dof.use_dof and not camera.library and "lens" not in camera:
+        camera["lens"] = lens_of(thing)
+        undo.append(lambda: camera.__delitem__("lens"))
+
+
+def lens_of(thing):
+    """Radius of a camera's lens and distance of what is sharp, in metres."""
+    focus = thing.data.dof
     distance = focus.focus_distance
     if focus.focus_object:
-        place = camera.matrix_world.normalized().inverted() @ focus.focus_object.matrix_world.translation
+        place = thing.matrix_world.normalized().inverted() @ focus.focus_object.matrix_world.translation
         distance = -place.z
-    return {"radius": camera.data.lens / 1000.0 / (2.0 * focus.aperture_fstop), "focus": max(distance, 1e-3)}
+    # As Cycles has it: a parallel projection has no focal length.
+    length = 1.0 if thing.data.type == "ORTHO" else thing.data.lens / 1000.0
+    return {"radius": length / (2.0 * max(focus.aperture_fstop, 1e-5)), "focus": max(distance, 1e-3)}
 
 
-def area_lights(scene):
-    """Area lights that shine in a render; portals only guide the samples of Cycles."""
-    return [
-        thing
-        for thing in scene.objects
-        if thing.type == "LIGHT"
-        and thing.data.type == "AREA"
-        and not thing.hide_render
-        and not getattr(getattr(thing.data, "cycles", None), "is_portal", False)
-    ]
-
-
-def make_surface(scene, lamp):
+def make_surface(scene, lamp, undo):
     """A mesh in the place of an area light, of the same radiance. glTF has no area lights."""
     light = lamp.data
     is_round = light.shape in {"DISK", "ELLIPSE"}
@@ -85,13 +127,17 @@ def make_surface(scene, lamp):
     else:
         corners = [(x * width / 2, y * height / 2, 0.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     mesh = bpy.data.meshes.new(lamp.name)
+    undo.append(lambda: bpy.data.meshes.remove(mesh))
     # An area light shines along -Z.
     mesh.from_pydata(corners, [], [range(len(corners))[::-1]])
-    mesh.materials.append(emission(lamp.name, radiance(lamp, width, height, is_round)))
+    material = bpy.data.materials.new(lamp.name)
+    undo.append(lambda: bpy.data.materials.remove(material))
+    make_emissive(material, radiance(lamp, width, height, is_round))
+    mesh.materials.append(material)
     surface = bpy.data.objects.new(lamp.name, mesh)
+    undo.append(lambda: bpy.data.objects.remove(surface))
     surface.matrix_world = lamp.matrix_world
     scene.collection.objects.link(surface)
-    return surface
 
 
 def radiance(lamp, width, height, is_round):
@@ -108,9 +154,8 @@ def radiance(lamp, width, height, is_round):
     return [watts * channel / math.pi for channel in colour]
 
 
-def emission(name, colour):
-    """A black material that shines from its front."""
-    material = bpy.data.materials.new(name)
+def make_emissive(material, colour):
+    """Makes a material black that emits light from its front."""
     if not material.node_tree:
         material.use_nodes = True
     material.use_backface_culling = True
@@ -120,4 +165,3 @@ def emission(name, colour):
     shader.inputs["Specular IOR Level"].default_value = 0.0
     shader.inputs["Emission Color"].default_value = (*(c / strength if strength else 0.0 for c in colour), 1.0)
     shader.inputs["Emission Strength"].default_value = strength
-    return material

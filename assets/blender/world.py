@@ -27,7 +27,7 @@ def tree_of(world):
 
 
 def background_of(world):
-    """What a world's surface is; None if nothing is."""
+    """The node linked to the surface of a world; None if there is none."""
     output = tree_of(world).get_output_node("CYCLES")
     return output and source_of(output.inputs["Surface"])
 
@@ -87,7 +87,7 @@ def turn_of(socket):
 
 
 def digest(world):
-    """Text that is another one when the world looks different."""
+    """A hash that changes when the world looks different."""
     found = hashlib.sha256()
     if world:
         found.update(repr(tuple(world.color)).encode())
@@ -106,7 +106,7 @@ def describe(owner, found, seen):
             found.update(repr(ends).encode())
         for node in owner.nodes:
             describe(node, found, seen)
-            for socket in node.inputs:
+            for socket in (*node.inputs, *node.outputs):
                 found.update(repr(plain(getattr(socket, "default_value", None))).encode())
         return
     if isinstance(owner, bpy.types.Image):
@@ -114,12 +114,13 @@ def describe(owner, found, seen):
         changed = os.path.getmtime(path) if os.path.isfile(path) else 0.0
         found.update(repr((owner.name, path, changed, owner.colorspace_settings.name)).encode())
         return
-    skipped = {"location", "location_absolute", "width", "height", "select", "parent", "rna_type", "dimensions"}
+    of_editor = {"location", "location_absolute", "width", "height", "select", "parent", "dimensions"}
+    is_node = isinstance(owner, bpy.types.Node)
     for name, kind in owner.bl_rna.properties.items():
-        if name in skipped or name.startswith("show_"):
+        if name == "rna_type" or is_node and (name in of_editor or name.startswith("show_")):
             continue
         if kind.type == "COLLECTION":
-            if isinstance(owner, bpy.types.Node):
+            if is_node:
                 continue
             for item in getattr(owner, name):
                 describe(item, found, seen)
@@ -171,7 +172,9 @@ def bake(world, path):
     scene = bpy.data.scenes.new("lightgrid world")
     camera = bpy.data.cameras.new("lightgrid world")
     eye = bpy.data.objects.new("lightgrid world", camera)
+    world = world.copy()
     try:
+        show_to_cameras(world)
         scene.world = world
         scene.collection.objects.link(eye)
         scene.camera = eye
@@ -195,6 +198,20 @@ def bake(world, path):
         bpy.data.objects.remove(eye)
         bpy.data.cameras.remove(camera)
         bpy.data.scenes.remove(scene)
+        bpy.data.worlds.remove(world)
+
+
+def show_to_cameras(world):
+    """Has cameras see what lights the scene, where worlds show them something else."""
+    if hasattr(world, "cycles_visibility"):
+        world.cycles_visibility.camera = True
+    tree = tree_of(world)
+    for link in list(tree.links):
+        if link.from_node.type == "LIGHT_PATH" and link.from_socket.name == "Is Camera Ray":
+            socket = link.to_socket
+            tree.links.remove(link)
+            if socket.type == "VALUE":
+                socket.default_value = 0.0
 
 
 def write_exr(path, pixels):

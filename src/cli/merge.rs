@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::picture::PictureArguments;
+use super::picture::{PictureArguments, say_written};
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
+use crate::output::Films;
 use crate::output::film_file::{FilmFacts, read_facts, read_film};
 use crate::render::film::Film;
 use crate::terminal::notice;
@@ -75,7 +76,12 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     }
     let Some(film) = joined else { return Err(Error::new("there is no part to be merged")) };
     let metadata = metadata(&parts, &film);
-    Error::all(picture.write_all(outputs, (&film).into(), &metadata))
+    let films = Films::from(&film);
+    let denoised = picture.denoised(outputs, films);
+    let films = Films { denoised: denoised.as_ref(), ..films };
+    let write =
+        |path: &PathBuf| picture.write(path, films, &metadata).map(|()| say_written(path)).err();
+    Error::all(outputs.iter().filter_map(write).collect())
 }
 
 /// What the parts say about themselves, in the order of their numbers: sums in f64 depend on the order

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
-use crate::image::{is_same_file, name_of_process};
+use crate::image::{Image, is_same_file, name_of_process};
 use crate::output::{self, Exposure, Films, LayerName, LinearRgb, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
@@ -216,22 +216,16 @@ impl PictureArguments {
         }
     }
 
-    /// Writes pictures: one that cannot be written must not take the others with it. Returns what failed. What several
-    /// of them show without noise is filtered once.
-    pub(super) fn write_all(
+    /// The picture without noise, where several of these pictures show it: it is filtered once.
+    pub(super) fn denoised<'a>(
         &self,
-        pictures: &[PathBuf],
+        pictures: impl IntoIterator<Item = &'a PathBuf>,
         films: Films<'_>,
-        metadata: &[(String, String)],
-    ) -> Vec<Error> {
-        let showing = pictures.iter().filter(|path| self.is_denoised([*path])).count();
-        let filter = self.options(films.film).denoiser.filter(|_| showing > 1);
+    ) -> Option<Image> {
+        let showing = pictures.into_iter().filter(|path| self.is_denoised([*path])).count();
+        let filter = self.options(films.film).denoiser.filter(|_| showing > 1)?;
         // Where it fails, each picture that is not written says why.
-        let denoised = filter.and_then(|it| it.finish(films.film, films.cached).ok());
-        let films = Films { denoised: denoised.as_ref(), ..films };
-        let write =
-            |path: &PathBuf| self.write(path, films, metadata).map(|()| say_written(path)).err();
-        pictures.iter().filter_map(write).collect()
+        filter.finish(films.film, films.cached).ok()
     }
 
     /// Writes a picture where it was asked to be or, if that fails, into the temporary folder.

@@ -1,4 +1,4 @@
-//! In the place of Open Image Denoise where no libraries can be loaded.
+//! Stands in for Open Image Denoise on systems that cannot load shared libraries.
 
 use std::sync::atomic::AtomicBool;
 

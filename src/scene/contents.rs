@@ -76,17 +76,18 @@ impl Scene {
         self.triangles.len() as u64 - shared + shown
     }
 
-    /// Index of the camera that `--camera` names, or else counts from 0.
+    /// Index of the camera of this name or, if none has it, of this number, counted from 0.
     ///
     /// # Errors
-    /// If the scene, which came from `file`, has no such camera.
+    /// If the scene has no such camera; the sentence calls the scene `file`.
     pub(crate) fn camera_number(&self, name: &str, file: &str) -> Result<usize> {
         let named = self.cameras.iter().position(|camera| camera.name == name);
         let counted = || name.parse().ok().filter(|number| *number < self.cameras.len());
         named.or_else(counted).ok_or_else(|| {
             let there_are = match self.cameras.len() {
                 0 => "no camera".to_owned(),
-                count => format!("no such camera, but 0 to {}: see `lightgrid info`", count - 1),
+                1 => format!("one camera, {:?}", self.cameras[0].name),
+                count => format!("cameras 0 to {}; `lightgrid info` names them", count - 1),
             };
             Error::new(format!("--camera {name}: {file} has {there_are}"))
         })

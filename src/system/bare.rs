@@ -1,4 +1,4 @@
-//! Systems that are asked for nothing, such as WebAssembly without an operating system: the library compiles for them.
+//! Stubs for targets without an operating system, such as `wasm32-unknown-unknown`: the library compiles for them.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub(crate) fn hang_up() -> Option<i32> {
     None
 }
 
-/// Nobody asks.
+/// There are no signals.
 pub(crate) fn on_request_to_end(_: impl FnMut(i32) + Send + 'static) -> io::Result<()> {
     Ok(())
 }
@@ -25,7 +25,7 @@ pub(crate) fn exit_now(code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// Nobody reads.
+/// There is no stderr.
 pub(crate) fn write_stderr(_: &[u8]) {}
 
 /// Left to the allocator.
@@ -71,5 +71,5 @@ pub(crate) fn leave_own_console() -> bool {
     false
 }
 
-/// Nobody reads.
+/// There is no stderr.
 pub(crate) fn show_error(_: &str) {}

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import sys
+import tempfile
 import time
 
 import bpy
@@ -66,6 +67,8 @@ def room(has_window):
     add("another", bpy.data.cameras.new("a camera")).location = (0, 0, 1)
     eye = add("eye", bpy.data.cameras.new("the camera"))
     eye.data.angle = math.radians(75)
+    # Another object with the same camera.
+    add("third", eye.data)
     eye.location, eye.rotation_euler = (-1.6, -1.6, 1.4), (math.radians(80), 0, math.radians(-40))
     scene.camera = eye
     scene.render.resolution_x, scene.render.resolution_y = SIZE
@@ -81,7 +84,15 @@ def room(has_window):
 def lamps():
     room(has_window=False)
     light("AREA", 60, (0.3, 0, 2.3), (0.3, 0.2, 0), shape="ELLIPSE", size=0.3, size_y=0.2, color=(1.0, 0.8, 0.5))
-    light("POINT", 20, (-1, 1, 2), shadow_soft_size=0.0)
+    warm = {"use_temperature": True, "temperature": 3000.0} if bpy.app.version >= (5, 0, 0) else {}
+    light("POINT", 20, (-1, 1, 2), shadow_soft_size=0.0, **warm)
+    hidden = bpy.data.collections.new("hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    hidden.hide_render = True
+    light("AREA", 1000, (0, 0, 1))
+    for thing in (bpy.data.objects["AREA.001"], box("in the way", (-1, -1, 1), (1, 1, 2), (0, 0, 0))):
+        bpy.context.scene.collection.objects.unlink(thing)
+        hidden.objects.link(thing)
     light("SPOT", 80, (1, -1, 2), (0.2, 0.3, 0), shadow_soft_size=0.0, spot_blend=0.0)
 
 
@@ -143,6 +154,41 @@ def reference(path, samples=512):
     bpy.ops.render.render(write_still=True)
 
 
+def state():
+    """What sending must leave as it was."""
+    kinds = ("cameras", "lights", "materials", "meshes", "objects", "scenes", "worlds")
+    names = {kind: sorted(thing.name for thing in getattr(bpy.data, kind)) for kind in kinds}
+    hidden = {thing.name: thing.hide_render for thing in bpy.data.objects}
+    colours = {thing.name: tuple(thing.color) for thing in bpy.data.lights}
+    data = {thing.name: thing.data and thing.data.name for thing in bpy.data.objects}
+    return names, hidden, colours, data, {camera.name: dict(camera.items()) for camera in bpy.data.cameras}
+
+
+def check_worlds(package):
+    """A world that cameras see black is sent as what lights the scene; a world of nodes is seen to change."""
+    tree, background = room(has_window=True)
+    background.inputs["Color"].default_value = (1, 1, 1, 1)
+    mix, path, black = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("MixShader", "LightPath", "Background"))
+    black.inputs["Strength"].default_value = 0.0
+    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(background.outputs[0], mix.inputs[1])
+    tree.links.new(black.outputs[0], mix.inputs[2])
+    value = tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = 2.0
+    tree.links.new(value.outputs[0], background.inputs["Strength"])
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    world, path = bpy.context.scene.world, os.path.join(FOLDER, "lit.exr")
+    size, package.world.BAKED_SIZE = package.world.BAKED_SIZE, (16, 8)
+    package.world.write(world, path)
+    package.world.BAKED_SIZE = size
+    image = bpy.data.images.load(path)
+    assert abs(image.pixels[0] - 2.0) < 1e-3, image.pixels[0]
+    before = package.world.digest(world)
+    value.outputs[0].default_value = 3.0
+    assert package.world.digest(world) != before
+
+
 def install(zip_file):
     """The add-on's package, once it is installed and switched on."""
     bpy.ops.extensions.package_install_files(filepath=zip_file, repo="user_default", enable_on_install=True)
@@ -159,14 +205,18 @@ def main(zip_file, program):
     rooms = {"lamps": lamps, "sun": sun, "lens": lens, "picture": lambda: picture(package), "sky": sky}
     for name, make in rooms.items():
         make()
-        before = sorted(thing.name for thing in bpy.data.objects)
+        before = state()
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(FOLDER, name + ".blend"))
         assert bpy.ops.lightgrid.send(opens=False) == {"FINISHED"}
-        assert sorted(thing.name for thing in bpy.data.objects) == before, "the scene is left as it was"
+        after = state()
+        assert after == before, f"the scene is left as it was: {after} is not {before}"
         sent = package.Sent.folder
         assert sorted(os.listdir(sent)) == ["scene.glb", "world.exr"], os.listdir(sent)
         found["rooms"][name] = package.arguments(bpy.context.scene, sent)
         reference(os.path.join(FOLDER, name + ".exr"))
+
+    check_worlds(package)
+    sky()
 
     # The world is written again where it has changed, and only there.
     bpy.ops.wm.save_as_mainfile(filepath=os.path.join(FOLDER, "changing.blend"))
@@ -191,19 +241,24 @@ def main(zip_file, program):
     # Opened, and sent again whenever the file is saved.
     bpy.context.preferences.addons[MODULE].preferences.program = program
     assert bpy.ops.lightgrid.send() == {"FINISHED"}
-    process = package.Sent.process
+    folder = package.Sent.folder
+    process = package.Sent.processes[folder]
     scene_file = os.path.join(package.Sent.folder, "scene.glb")
     sent = os.stat(scene_file).st_mtime_ns
     bpy.ops.wm.save_mainfile()
     assert os.stat(scene_file).st_mtime_ns > sent, "saving sends"
     assert bpy.ops.lightgrid.send() == {"FINISHED"}
-    assert package.Sent.process is process, "one lightgrid shows a scene"
-    picture_file = os.path.join(package.Sent.folder, "lightgrid.png")
+    assert package.Sent.processes == {folder: process}, "one lightgrid shows a scene"
+    # Saved under another name it is another scene, which nobody looks at yet.
+    sent = os.stat(scene_file).st_mtime_ns
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.join(FOLDER, "another.blend"))
+    assert package.Sent.folder == folder and os.stat(scene_file).st_mtime_ns == sent
+    picture_file = os.path.join(tempfile.gettempdir(), "lightgrid.png")
     time.sleep(3.0)
     process.terminate()
     found["status"] = process.wait(60)
     found["picture"] = os.path.isfile(picture_file)
-    with open(os.path.join(package.Sent.folder, "lightgrid.log"), encoding="utf-8") as log:
+    with open(os.path.join(folder, "lightgrid.log"), encoding="utf-8") as log:
         found["log"] = log.read()
     bpy.ops.preferences.addon_disable(module=MODULE)
     with open(os.path.join(FOLDER, "sent.json"), "w", encoding="utf-8") as file:

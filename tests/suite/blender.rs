@@ -57,6 +57,7 @@ fn a_scene_sent_by_blender_is_the_one_that_cycles_renders() {
         .args([zip.trim(), lightgrid])
         .arg(folder.path())
         .env("BLENDER_USER_RESOURCES", at("user"))
+        .env("TMPDIR", folder.path())
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY"));
     let found = std::fs::read_to_string(at("sent.json")).expect("the script wrote it");

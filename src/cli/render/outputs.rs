@@ -96,16 +96,16 @@ pub(super) fn write(
 ) -> Vec<Error> {
     let films = Films { film: record.film, cached, denoised: None };
     let metadata = record.metadata();
-    let (picture, outputs) = (&arguments.picture, &arguments.outputs);
-    let write_part = |path: &PathBuf| {
-        assignment.write_part(path, driver, record).map(|()| say_written(path)).err()
+    let pictures = arguments.pictures().filter(|_| arguments.part.is_none());
+    let denoised = arguments.picture.denoised(pictures, films);
+    let films = Films { denoised: denoised.as_ref(), ..films };
+    let write = |path: &PathBuf| match arguments.part {
+        Some(_) => assignment.write_part(path, driver, record),
+        None => arguments.picture.write(path, films, &metadata),
     };
-    let mut failures = match arguments.part {
-        Some(_) => outputs.iter().filter_map(write_part).collect(),
-        None => picture.write_all(outputs, films, &metadata),
-    };
-    let frame = arguments.frame_of_video.as_ref();
-    failures.extend(frame.and_then(|path| picture.write(path, films, &metadata).err()));
+    let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
+    let mut failures: Vec<Error> = arguments.outputs.iter().filter_map(write_and_say).collect();
+    failures.extend(arguments.frame_of_video.as_ref().and_then(|path| write(path).err()));
     if let Some(path) = &arguments.json {
         let written = record::write_json(path, &record.to_json());
         failures.extend(written.map(|()| say_written(path)).err());
