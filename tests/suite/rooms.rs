@@ -136,7 +136,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("bench", 589),
     ("bsdf", 1417),
     ("bvh", 1352),
-    ("cli", 3517),
+    ("cli", 3520),
     ("color", 25),
     ("denoise", 1040),
     ("develop", 468),
