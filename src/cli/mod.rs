@@ -84,7 +84,7 @@ struct Arguments {
 enum Command {
     /// Open the window.
     #[cfg_attr(not(feature = "window"), command(hide = true))]
-    View(view::ViewArguments),
+    View(Box<view::ViewArguments>),
     /// Draw the window's content into a file; no display is needed.
     #[cfg_attr(not(feature = "window"), command(hide = true))]
     Screenshot(Box<screenshot::ScreenshotArguments>),
