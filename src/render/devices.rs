@@ -46,6 +46,9 @@ impl DeviceChoice {
             (Self::Auto, None) if gpu::adapters().first().is_none_or(AdapterFacts::is_software) => {
                 Ok(None)
             }
+            // A card that cannot be opened leaves software, which is no reason to leave the CPU.
+            (Self::Auto, None) => Gpu::open_or_share(None, shared)
+                .map(|gpu| Some(gpu).filter(|gpu| !gpu.facts().is_software())),
             (_, name) => Gpu::open_or_share(name, shared).map(Some),
         }
     }
