@@ -52,17 +52,16 @@ def prepare(scene, undo):
         mode = active.mode
         undo.append(lambda: bpy.ops.object.mode_set(mode=mode))
     shown = rendered(bpy.context.view_layer.layer_collection, set())
-    for thing in scene.objects:
-        if thing not in shown and not thing.hide_render:
+    for thing in [thing for thing in scene.objects if not thing.hide_render]:
+        if thing not in shown:
             set_for_export(thing, "hide_render", True, undo)
-    for thing in [thing for thing in scene.objects if thing in shown and not thing.hide_render]:
-        if thing.type == "CAMERA":
+        elif thing.type == "CAMERA":
             prepare_camera(scene, thing, undo)
         elif thing.type == "LIGHT" and thing.data.type == "AREA":
             # Portals only guide the samples of Cycles.
             if not getattr(getattr(thing.data, "cycles", None), "is_portal", False):
                 make_surface(scene, thing, undo)
-        elif thing.type == "LIGHT" and getattr(thing.data, "use_temperature", False) and not thing.data.library:
+        elif thing.type == "LIGHT" and getattr(thing.data, "use_temperature", False) and thing.data.is_editable:
             # Blender's exporter fails at it.
             colour = [own * warm for own, warm in zip(thing.data.color, thing.data.temperature_color)]
             set_for_export(thing.data, "color", colour, undo)
@@ -89,7 +88,7 @@ def set_for_export(owner, name, value, undo):
 
 def prepare_camera(scene, thing, undo):
     """Puts the lens of a camera into its extras, where lightgrid finds it: glTF has no lens."""
-    if thing == scene.camera and thing.data.users > 1 and not thing.data.library:
+    if thing == scene.camera and thing.data.users > 1 and thing.data.is_editable:
         # Its name is to be the name of one camera.
         shared, name = thing.data, thing.data.name
         set_for_export(shared, "name", "lightgrid others", undo)
@@ -98,7 +97,7 @@ def prepare_camera(scene, thing, undo):
         own.name = name
         set_for_export(thing, "data", own, undo)
     camera = thing.data
-    if camera.dof.use_dof and not camera.library and "lens" not in camera:
+    if camera.dof.use_dof and camera.is_editable and "lens" not in camera:
         camera["lens"] = lens_of(thing)
         undo.append(lambda: camera.__delitem__("lens"))
 

@@ -215,7 +215,10 @@ def show_to_cameras(world):
 
 
 def write_exr(path, pixels):
-    """Writes rows of RGB as scan lines without compression, in half floats where all values fit."""
+    """Writes rows of RGB as scan lines without compression, in half floats where all values fit.
+
+    Blender's own `Image.save` changes colours before version 5: 1e5 becomes 128.
+    """
     height, width, _ = pixels.shape
     is_half = pixels.max() <= MAX_HALF
     kind, channel_type = ("<f2", 1) if is_half else ("<f4", 2)

@@ -6,6 +6,8 @@ use std::process::Command;
 use lightgrid::image::read_picture;
 use serde_json::Value;
 
+use crate::cli::text;
+
 /// Pixels of a block whose means are compared, each way.
 const BLOCK: usize = 6;
 
@@ -22,7 +24,6 @@ fn python() -> Option<String> {
 
 fn run(command: &mut Command) -> String {
     let output = command.output().expect("it starts");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let said = text(&output.stdout) + &text(&output.stderr);
     assert!(output.status.success(), "{command:?}: {said}");
     said

@@ -548,7 +548,14 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
             "scene.gltf: is a glTF scene, where a map",
         ),
         ("render scene.gltf -o a.png --env sky:mars".into(), "no built-in sky called \"mars\""),
-        ("render open -o a.png --camera sofa".into(), "--camera sofa: open has "),
+        (
+            "render open -o a.png --camera sofa".into(),
+            "--camera sofa: open has one camera, \"terrace\"",
+        ),
+        (
+            "render office -o a.png --camera sofa".into(),
+            "--camera sofa: office has cameras 0 to 2; `lightgrid info` names them",
+        ),
         ("render open -o a.png --variant red".into(), "open: there is no variant red: it has none"),
         ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
         ("info none.exr".into(), "none.exr: there is no such file"),

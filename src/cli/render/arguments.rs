@@ -344,14 +344,21 @@ impl RenderArguments {
         })
     }
 
+    /// Index of the camera that was asked for, else of the first.
+    ///
+    /// # Errors
+    /// If the scene has no such camera.
+    pub(super) fn camera_number(&self, world: &World) -> Result<usize> {
+        let name = self.place.camera.as_ref();
+        name.map_or(Ok(0), |name| world.scene.camera_number(name, &self.scene))
+    }
+
     pub(super) fn camera(&self, world: &World, notices: &mut Notices) -> Result<Camera> {
         let cameras = &world.scene.cameras;
         let frame = world.scene.frame;
         let camera = if let Some(place) = self.place.placed()? {
             place.camera(frame)
-        } else if let Some(name) = &self.place.camera {
-            cameras[world.scene.camera_number(name, &self.scene)?].clone()
-        } else if let Some(camera) = cameras.first() {
+        } else if let Some(camera) = cameras.get(self.camera_number(world)?) {
             camera.clone()
         } else {
             let chosen = framing::frame(world, self.size.0 as f32 / self.size.1 as f32);

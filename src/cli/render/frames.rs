@@ -48,9 +48,7 @@ impl<'a> Frames<'a> {
             }
             (Some(frames), None) => {
                 let paths = &world.scene.camera_paths;
-                let named = arguments.place.camera.as_ref();
-                let number = named.map(|name| world.scene.camera_number(name, &arguments.scene));
-                let path = paths.get(number.transpose()?.unwrap_or(0)).and_then(Option::as_ref);
+                let path = paths.get(arguments.camera_number(world)?).and_then(Option::as_ref);
                 let path = path.filter(|_| arguments.place.eye.is_none()).ok_or_else(|| {
                     Error::new(format!(
                         "--frames: the camera does not move in {} (--turntable turns any)",
