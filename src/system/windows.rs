@@ -11,11 +11,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use windows_sys::Win32::Foundation::FILETIME;
+use windows_sys::Win32::Foundation::{FILETIME, HWND, LPARAM, LRESULT, WPARAM};
 use windows_sys::Win32::Storage::FileSystem::{DeleteFileW, WriteFile};
 use windows_sys::Win32::System::Console::{
-    CTRL_BREAK_EVENT, CTRL_C_EVENT, CTRL_CLOSE_EVENT, FreeConsole, GetConsoleProcessList,
-    GetStdHandle, STD_ERROR_HANDLE, SetConsoleCtrlHandler,
+    CTRL_BREAK_EVENT, CTRL_C_EVENT, CTRL_CLOSE_EVENT, CTRL_SHUTDOWN_EVENT, FreeConsole,
+    GetConsoleProcessList, GetStdHandle, STD_ERROR_HANDLE, SetConsoleCtrlHandler,
 };
 use windows_sys::Win32::System::LibraryLoader::SetDllDirectoryW;
 use windows_sys::Win32::System::Memory::{
@@ -26,8 +26,11 @@ use windows_sys::Win32::System::Threading::{
     CREATE_NEW_PROCESS_GROUP, GetCurrentProcess, GetCurrentThread, GetThreadTimes,
     SetThreadPriority, THREAD_PRIORITY_BELOW_NORMAL, TerminateProcess,
 };
-use windows_sys::Win32::UI::WindowsAndMessaging::{MB_ICONERROR, MB_OK, MessageBoxW};
-use windows_sys::core::BOOL;
+use windows_sys::Win32::UI::WindowsAndMessaging::{
+    CreateWindowExW, DefWindowProcW, DispatchMessageW, GWLP_WNDPROC, GetMessageW, MB_ICONERROR,
+    MB_OK, MSG, MessageBoxW, SetWindowLongPtrW, WM_ENDSESSION,
+};
+use windows_sys::core::{BOOL, w};
 
 /// Prepares the process: libraries are not looked for in the current folder, which may be that of somebody's scene.
 pub(crate) fn prepare_process() {
@@ -57,6 +60,7 @@ static ANSWER: Mutex<Option<Answer>> = Mutex::new(None);
 /// If they cannot be caught.
 pub(crate) fn on_request_to_end(answer: impl FnMut(i32) + Send + 'static) -> io::Result<()> {
     *ANSWER.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(answer));
+    std::thread::Builder::new().name("end of session".into()).spawn(watch_session)?;
     // SAFETY: the handler is there as long as the process.
     match unsafe { SetConsoleCtrlHandler(Some(handle_request_to_end), 1) } {
         0 => Err(io::Error::last_os_error()),
@@ -80,6 +84,38 @@ unsafe extern "system" fn handle_request_to_end(event: u32) -> BOOL {
         }
     }
     1
+}
+
+/// Watches for a log-off or a shutdown. A program that loads `user32.dll` learns of them by messages to a window alone,
+/// so a hidden one is made.
+fn watch_session() {
+    // SAFETY: the texts end with 0, the window belongs to this thread, and its procedure stays as long as the process.
+    unsafe {
+        let none = null_mut();
+        let (class, title) = (w!("STATIC"), w!("lightgrid"));
+        let window = CreateWindowExW(0, class, title, 0, 0, 0, 0, 0, none, none, none, null());
+        SetWindowLongPtrW(window, GWLP_WNDPROC, handle_message as *const () as isize);
+        let mut message = MSG::default();
+        while GetMessageW(&mut message, none, 0, 0) > 0 {
+            DispatchMessageW(&message);
+        }
+    }
+}
+
+/// Handles a message to the hidden window. `is_certain` is 0 where somebody refused the end of the session.
+unsafe extern "system" fn handle_message(
+    window: HWND,
+    message: u32,
+    is_certain: WPARAM,
+    reason: LPARAM,
+) -> LRESULT {
+    // SAFETY: the system calls this, with a message of its own.
+    unsafe {
+        if message == WM_ENDSESSION && is_certain != 0 {
+            handle_request_to_end(CTRL_SHUTDOWN_EVENT);
+        }
+        DefWindowProcW(window, message, is_certain, reason)
+    }
 }
 
 /// Ends the process without running anything else of it. Takes no memory.
@@ -207,12 +243,10 @@ pub(crate) fn show_error(text: &str) {
 mod tests {
     use std::sync::mpsc;
 
-    use windows_sys::Win32::System::Console::CTRL_SHUTDOWN_EVENT;
-
     use super::*;
 
     #[test]
-    fn events_of_the_console_are_answered_and_one_that_ends_the_process_is_held() {
+    fn requests_to_end_are_answered_and_one_that_ends_the_process_is_held() {
         let (sender, answers) = mpsc::channel();
         on_request_to_end(move |signal| {
             let _ = sender.send(signal);
@@ -230,5 +264,15 @@ mod tests {
             std::thread::sleep(Duration::from_millis(100));
             assert!(!held.is_finished());
         }
+        let (window, none) = (null_mut(), 0);
+        // SAFETY: as above; no window has this message. Somebody else may have refused the end of the session.
+        assert_eq!(unsafe { handle_message(window, WM_ENDSESSION, 0, none) }, 0);
+        assert!(answers.try_recv().is_err());
+        // SAFETY: as above.
+        let end = || unsafe { handle_message(null_mut(), WM_ENDSESSION, 1, 0) };
+        let held = std::thread::spawn(end);
+        assert_eq!(answers.recv(), Ok(TERMINATE));
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(!held.is_finished());
     }
 }

@@ -165,7 +165,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("shaders", 6060),
     ("sources", 119),
     ("stability", 1891),
-    ("system", 381),
+    ("system", 409),
     ("terminal", 48),
     ("tone", 188),
 ];
