@@ -7,11 +7,11 @@ use glam::{Vec2, Vec3};
 use super::document::{Document, Viewpoint};
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
 use super::reload::Reload;
-use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::framing;
+use crate::render::surface_map;
 use crate::scene::{Camera, Material, StartView};
 use crate::sources;
 

@@ -19,10 +19,11 @@ use super::settings_file::lasting_scene;
 use super::sync::stay_in_scene;
 use super::tasks::TaskResult;
 use super::worker::{Activity, Reference, Snapshot};
-use super::{convergence, desktop, save, surface_map, theme};
+use super::{convergence, desktop, save, theme};
 
 use crate::image::{Image, read_picture};
 use crate::render::gpu::DeviceChoice;
+use crate::render::surface_map::look_at_place;
 use crate::scene::builtin;
 use crate::sources;
 use crate::tone::display_rgb8;
@@ -282,7 +283,7 @@ impl App {
         let pointed = || {
             let place = self.interface.inspected()?;
             let seen = self.seen()?;
-            surface_map::look_at_place(&seen.request.world, &seen.view(), place)
+            look_at_place(&seen.request.world, &seen.view(), place)
         };
         let chosen = self.interface.material.or_else(|| Some(pointed()?.material))?;
         let scene = &self.assets.scene_of(&self.edited.document)?.world.scene;

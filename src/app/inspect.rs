@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::interface::Interface;
-use super::surface_map::{Spot, look_at_place};
 use super::worker::Snapshot;
 use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;
@@ -15,6 +14,7 @@ use crate::light_grid::tile_distributions::TileDistributions;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::path::World;
 use crate::radiance_cache::KnownCell;
+use crate::render::surface_map::{Spot, look_at_place};
 
 /// Directions per tile for the truth: a standard error of some per cent for tiles half seen.
 const TRUTH_SAMPLES: u32 = 256;

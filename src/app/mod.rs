@@ -43,7 +43,6 @@ pub mod screenshot;
 pub mod settings_file;
 mod small_maps;
 mod speed_up;
-pub(crate) mod surface_map;
 mod sync;
 mod tasks;
 #[cfg(test)]

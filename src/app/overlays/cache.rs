@@ -8,7 +8,7 @@ use super::overlay::Overlay;
 use super::painted::{Legend, Painted, Range, scaled};
 use super::palette;
 use crate::app::document::Look;
-use crate::app::surface_map::{Spot, SurfaceMap};
+use crate::render::surface_map::{Spot, SurfaceMap};
 use crate::color::srgb_from_linear;
 use crate::radiance_cache::{CacheFacts, KnownCell};
 

@@ -7,9 +7,9 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::{Film, Pixel};
+use crate::render::surface_map::{Spot, SurfaceMap};
 
 use super::document::Look;
-use super::surface_map::{Spot, SurfaceMap};
 
 mod cache;
 mod cell_facts;

@@ -12,8 +12,8 @@ use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{CLICK_DISTANCE, Drag, Step};
 use crate::app::interface::Tab;
-use crate::app::surface_map::{Spot, look_at_place};
 use crate::app::theme;
+use crate::render::surface_map::{Spot, look_at_place};
 
 /// Takes gestures in the picture: `whole` is all of it, `rect` the part that is rendered, and what
 /// begins on `handle` is not meant for it.

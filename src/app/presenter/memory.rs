@@ -10,12 +10,12 @@ use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
 use crate::app::overlays::{CellFacts, Label, Legend, Overlay, Sources};
-use crate::app::surface_map::SurfaceMap;
 use crate::app::worker::{Request, Snapshot};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::LightGrid;
+use crate::render::surface_map::SurfaceMap;
 use crate::tone::WhiteBalance;
 
 /// The last result and what it was made for.

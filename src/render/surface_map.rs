@@ -3,9 +3,9 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::view::View;
 use crate::bvh::{Ray, offset_origin};
 use crate::path::World;
-use crate::render::View;
 
 /// Panes and leaves that a look passes at most.
 const MAX_PASSES: u32 = 32;
