@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use egui::{Event, Key, KeyboardShortcut, Modifiers};
+use glam::Vec2;
 
 use super::document::Viewpoint;
 use super::interface::Purpose;
@@ -42,6 +43,15 @@ pub enum Command {
     Restart,
     /// Render a part that is marked next, or the whole again.
     ToggleRegion,
+    /// Put the sun where is clicked next, or no longer.
+    ToggleSun,
+    /// Turn the map so that its sun shines on a place of the picture, both coordinates in `[0,1]`.
+    PutSun {
+        /// Where.
+        place: Vec2,
+        /// Whether the pointer was let go there.
+        is_last: bool,
+    },
     /// Take a change back.
     Undo,
     /// Bring it again.
@@ -83,7 +93,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 23] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 24] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -91,6 +101,7 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 23] = [
     (plain(Key::B), "Keep this viewpoint", Command::Bookmark),
     (plain(Key::K), "Keep this picture for comparison", Command::KeepPicture),
     (plain(Key::X), "Render a region (drag it), or all again", Command::ToggleRegion),
+    (plain(Key::L), "Put the sun where you click", Command::ToggleSun),
     (plain(Key::Z), "Zoom to 100 %, or fit", Command::ToggleZoom),
     (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
     (plain(Key::G), "CPU or GPU", Command::ToggleDevice),

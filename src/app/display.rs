@@ -12,6 +12,7 @@ use super::screen::Screen;
 use super::threads::Wake;
 use super::worker::{Request, Snapshot};
 use crate::develop::DevelopSettings;
+use crate::environment::sun::Sun;
 use crate::error::Result;
 use crate::image::Rgb8;
 
@@ -62,7 +63,7 @@ impl Display {
         &mut self,
         (snapshot, latest): (&Arc<Snapshot>, Option<Arc<Request>>),
         document: &Document,
-        interface: &Interface,
+        (overlay, tile, sun): (Option<Overlay>, Option<u32>, Option<Sun>),
         compared: Option<Comparison>,
     ) {
         let look = &document.look;
@@ -72,9 +73,10 @@ impl Display {
             ahead: latest.filter(|latest| latest.moving && latest.view != snapshot.request.view),
             denoiser: look.denoise.then(|| look.denoiser.found()),
             metered: look.auto_exposure.then_some(look.white_balance),
-            overlay: interface.overlay,
-            look: interface.overlay.filter(|o| o.is_developed()).map(|_| *look),
-            tile: interface.tile,
+            overlay,
+            look: overlay.filter(|o| o.is_developed()).map(|_| *look),
+            tile,
+            sun: sun.filter(|_| overlay == Some(Overlay::Sun)),
             compared,
         });
     }
@@ -96,14 +98,18 @@ impl Display {
         interface: &Interface,
     ) -> Option<DevelopSettings> {
         let look = &document.look;
-        let is_opaque = interface.overlay.is_some_and(Overlay::is_opaque);
-        let opacity = if is_opaque { 1.0 } else { interface.overlay_opacity };
+        let opacity = interface.overlay_opacity;
+        let opacity = match self.shown.as_ref().and_then(|shown| shown.order.overlay) {
+            Some(overlay) if overlay.is_opaque() => [1.0, 0.6],
+            Some(Overlay::Sun) => [0.6 * opacity, 0.0],
+            // What the overlay does not speak of steps back.
+            _ => [opacity, 0.6 * opacity],
+        };
         Some(DevelopSettings {
             white_balance: look.white_balance,
             exposure_ev: self.exposure_ev(document)?,
             curve: look.curve,
-            // What the overlay does not speak of steps back.
-            opacity: [opacity, 0.6 * opacity],
+            opacity,
         })
     }
 

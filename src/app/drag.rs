@@ -53,6 +53,14 @@ impl Step {
             Self::End { .. } => 0.0,
         }
     }
+
+    /// Where the button was let go, if it was.
+    pub(super) fn end(&self) -> Option<Pos2> {
+        match self {
+            Self::Move { .. } => None,
+            Self::End { to, .. } => Some(*to),
+        }
+    }
 }
 
 impl Drag {

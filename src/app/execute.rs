@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::application::App;
 use super::assets::room_viewpoint;
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
-use super::interface::{Chosen, Purpose, Tab};
+use super::interface::{Chosen, Purpose, Tab, Tool};
 use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
 use super::overlays::Overlay;
@@ -21,8 +21,10 @@ use super::tasks::TaskResult;
 use super::worker::{Activity, Reference, Snapshot};
 use super::{convergence, desktop, save, theme};
 
+use crate::error::Result;
 use crate::image::{Image, read_picture};
 use crate::render::gpu::DeviceChoice;
+use crate::render::sun_placement::SunPlacement;
 use crate::render::surface_map::look_at_place;
 use crate::scene::builtin;
 use crate::sources;
@@ -89,11 +91,23 @@ impl App {
                 interface.paused = false;
             }
             Command::ToggleRegion => {
-                interface.is_marking = document.region.is_none() && !interface.is_marking;
+                let marks = document.region.is_none() && interface.tool != Some(Tool::Region);
+                interface.tool = marks.then_some(Tool::Region);
                 document.region = None;
                 interface.pinned = None;
                 // A part of what is rendered is marked there.
                 (interface.compared.right, interface.compared.is_difference) = (None, false);
+            }
+            Command::ToggleSun => {
+                let is_on = interface.tool == Some(Tool::Sun);
+                interface.tool = (!is_on).then_some(Tool::Sun);
+                // The sun falls into what is rendered.
+                (interface.compared.right, interface.compared.is_difference) = (None, false);
+            }
+            Command::PutSun { place, is_last } => {
+                let said = self.put_sun(place).unwrap_or_else(|cause| Some(cause.to_string()));
+                let said = said.into_iter().filter(|_| is_last);
+                said.for_each(|sentence| self.messages.notice(sentence));
             }
             Command::Undo => {
                 if let Some(document) = self.edited.before() {
@@ -127,7 +141,7 @@ impl App {
             }
             Command::ToggleDeveloper => interface.toggle_developer(),
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
-            Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),
+            Command::CloseSheets => (interface.shortcuts, interface.tool) = (false, None),
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => self.set_as_kept(index),
             Command::ToggleZoom => interface.toggle_zoom(document.size),
@@ -141,6 +155,20 @@ impl App {
                 }
             }
         }
+    }
+
+    /// Turns the map so that its sun shines on a place of the picture; what there is to say of it.
+    ///
+    /// # Errors
+    /// As [`SunPlacement::find`].
+    pub(super) fn put_sun(&mut self, place: Vec2) -> Result<Option<String>> {
+        let Some(seen) = self.seen() else { return Ok(None) };
+        let sun = self.assets.map.as_ref().and_then(|map| map.sun);
+        let (world, view) = (&seen.request.world, seen.view());
+        let degrees = self.edited.document.rotation_degrees;
+        let found = SunPlacement::find(world, &view, sun.as_ref(), place, degrees)?;
+        self.edited.document.rotation_degrees = found.rotation_degrees;
+        Ok(found.notice())
     }
 
     /// Asks for a path: by a prompt, and by the system's dialogue before it where there is one.

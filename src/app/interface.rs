@@ -49,8 +49,8 @@ pub struct Interface {
     pub wipe: f32,
     /// Whether what was learned is kept as it is.
     pub is_frozen: bool,
-    /// Whether the next drag marks the part that is to be rendered.
-    pub is_marking: bool,
+    /// What the next drag or click in the picture does, if it does not move the camera.
+    pub tool: Option<Tool>,
     /// The drag over the picture under way.
     pub drag: Option<Drag>,
     /// That of the wipe.
@@ -67,8 +67,19 @@ pub struct Interface {
     pub viewport_of: Option<([u32; 2], bool)>,
     /// Until when the camera counts as moving, in the window's seconds.
     pub moving_until: f64,
+    /// Until when the map counts as turning.
+    pub turning_until: f64,
     /// Keys held that fly the camera.
     pub flying: Vec<egui::Key>,
+}
+
+/// What a drag or a click in the picture is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tool {
+    /// It marks the part that is to be rendered.
+    Region,
+    /// It puts the map's sun there.
+    Sun,
 }
 
 /// Pictures of the history, by their number, that are compared.
@@ -227,7 +238,7 @@ impl Default for Interface {
             zoom: Zoom::default(),
             wipe: 0.5,
             is_frozen: false,
-            is_marking: false,
+            tool: None,
             drag: None,
             wipe_drag: None,
             map_drag: None,
@@ -236,6 +247,7 @@ impl Default for Interface {
             viewport_pixels: None,
             viewport_of: None,
             moving_until: f64::NEG_INFINITY,
+            turning_until: f64::NEG_INFINITY,
             flying: Vec::new(),
         }
     }
@@ -253,6 +265,17 @@ impl Interface {
     pub fn keep_moving(&mut self, context: &egui::Context) {
         let frame_seconds = context.input(|input| input.unstable_dt);
         self.moving_until = context.time() + f64::from((3.0 * frame_seconds).clamp(0.18, 1.0));
+    }
+
+    /// Tells that the map turns, as [`Self::keep_moving`] does: for a moment it is marked where its sun shines.
+    pub fn keep_turning(&mut self, context: &egui::Context) {
+        self.keep_moving(context);
+        self.turning_until = self.moving_until;
+    }
+
+    /// What is drawn over the picture.
+    pub fn overlay_at(&self, now: f64) -> Option<Overlay> {
+        self.overlay.or((now < self.turning_until).then_some(Overlay::Sun))
     }
 
     /// Looks at a material, whose settings come into sight, or at none.

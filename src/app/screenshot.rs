@@ -126,6 +126,17 @@ impl Studio {
         Ok(())
     }
 
+    /// Turns the map so that its sun shines on a place of the picture, both coordinates in `[0,1]`.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or the sun cannot be turned there.
+    pub fn put_sun(&mut self, place: glam::Vec2) -> Result<()> {
+        self.settle()?;
+        let notice = self.app.put_sun(place)?;
+        notice.into_iter().for_each(|notice| self.app.messages.notice(notice));
+        Ok(())
+    }
+
     /// Refuses a tile that the map does not have.
     ///
     /// # Errors

@@ -248,7 +248,10 @@ impl App {
             let compared = Comparison::new(self.interface.compared, &self.library.history);
             let compared = compared.filter(|_| is_whole);
             let latest = self.rendering.worker.latest();
-            self.display.order((snapshot, latest), document, &self.interface, compared);
+            let overlay = self.interface.overlay_at(context.time());
+            let sun = self.assets.map.as_ref().and_then(|map| map.sun);
+            let drawn = (overlay, self.interface.tile, sun);
+            self.display.order((snapshot, latest), document, drawn, compared);
         }
     }
 

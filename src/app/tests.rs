@@ -6,13 +6,14 @@ use std::time::Duration;
 
 use egui::Id;
 use egui::containers::PanelState;
+use glam::Vec2;
 
 use super::application::Start;
 use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
 use super::edited;
 use super::interface::{Dock, Interface, Tab};
-use super::overlays::Overlay;
+use super::overlays::{Legend, Overlay};
 use super::reload::Reload;
 use super::screenshot::{Shot, Studio};
 use crate::environment::{Environment, EnvironmentOptions};
@@ -318,6 +319,32 @@ fn it_is_said_once_that_no_light_gets_in() {
 }
 
 #[test]
+fn the_sun_is_put_where_it_is_asked_for_and_marked_there() {
+    let Some(mut studio) = studio("living-room") else { return };
+    let sunlit = |studio: &mut Studio| -> f32 {
+        studio.settle().expect("rendered");
+        let legend = studio.app.display.shown.as_ref().and_then(|shown| shown.legend.clone());
+        let Some(Legend::Names(names)) = legend else { panic!("no names: {legend:?}") };
+        let percent = names[0].1.strip_prefix("sunlit, ").and_then(|it| it.split_once(' '));
+        percent.expect("a share").0.parse().expect("a number")
+    };
+    studio.arrange(Interface { overlay: Some(Overlay::Sun), ..Interface::default() });
+    studio.app.edited.document.rotation_degrees = 180.0;
+    assert_eq!(sunlit(&mut studio), 0.0);
+    let place = Vec2::new(0.9, 0.9);
+    studio.asks(Command::PutSun { place, is_last: true });
+    assert!(sunlit(&mut studio) > 1.0);
+    assert!(studio.app.messages.list().is_empty(), "{:?}", studio.app.messages.list());
+    // The ceiling cannot be reached: what is said of it is said when the pointer is let go.
+    let place = Vec2::new(0.5, 0.02);
+    studio.asks(Command::PutSun { place, is_last: false });
+    assert!(studio.app.messages.list().is_empty());
+    studio.asks(Command::PutSun { place, is_last: true });
+    let said: Vec<_> = studio.app.messages.list().iter().map(|it| &*it.sentence).collect();
+    assert!(said.len() == 1 && said[0].contains("cannot reach this place"), "{said:?}");
+}
+
+#[test]
 fn lamps_are_scaled_apart_from_the_map() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lit.gltf");
@@ -408,7 +435,7 @@ fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
 fn the_truth_of_another_map_is_never_shown() {
     let Some(mut studio) = studio("open") else { return };
     studio.app.interface.tab = Tab::Inspect;
-    studio.app.interface.pinned = Some(glam::Vec2::new(0.5, 0.9));
+    studio.app.interface.pinned = Some(Vec2::new(0.5, 0.9));
     let measured = |studio: &mut Studio| {
         studio.measure_truth().expect("rendered");
         studio.settle().expect("measured");

@@ -167,6 +167,7 @@ choices! {
         CacheCells = "cache-cells": "Cells of the radiance cache, which cached light comes from"
         CacheRadiance = "cache-radiance": "Radiance of those cells, developed as the picture is"
         CacheSamples = "cache-samples": "What has trained those cells"
+        Sun = "sun": "What the map's sun shines on"
         Samples = "samples": "Samples of each pixel"
         Error = "error": "Estimated error of each pixel"
         Albedo = "albedo": "Albedo of the first surface"

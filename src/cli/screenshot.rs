@@ -92,7 +92,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long)]
     denoise: bool,
     /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
-    #[arg(long, value_parser = place, allow_hyphen_values = true, value_name = "X,Y")]
+    #[arg(long, value_parser = values::place, allow_hyphen_values = true, value_name = "X,Y")]
     inspect: Option<Vec2>,
     /// The material whose settings are shown, by its name.
     #[arg(long, value_name = "MATERIAL")]
@@ -106,6 +106,9 @@ pub(super) struct ScreenshotArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG")]
     env_rotation: f64,
+    /// Turns the map so that its sun shines on this place of the picture, X,Y in [0,1], or near it.
+    #[arg(long, value_parser = values::place, conflicts_with = "env_rotation", allow_hyphen_values = true, value_name = "X,Y")]
+    sun_at: Option<Vec2>,
     /// Multiplies the light of the map's sun, and not its sky.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X")]
     env_sun: f32,
@@ -118,13 +121,6 @@ pub(super) struct ScreenshotArguments {
     /// The picture to write, .png.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-}
-
-fn place(text: &str) -> std::result::Result<Vec2, String> {
-    values::list(text)
-        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
-        .map(Vec2::from_array)
-        .ok_or_else(|| "expected two numbers from 0 to 1 like 0.25,0.7".to_owned())
 }
 
 fn scale(text: &str) -> std::result::Result<f32, String> {
@@ -196,6 +192,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     .at_scale(arguments.scale);
     if let Some(material) = &arguments.select {
         studio.choose_material(material)?;
+    }
+    if let Some(place) = arguments.sun_at {
+        studio.put_sun(place)?;
     }
     if let Some(tile) = arguments.tile {
         studio.check_tile(tile)?;

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::output::film_file::Part;
 use crate::path::Background;
@@ -55,6 +55,14 @@ pub(super) fn noise(text: &str) -> Result<f64, String> {
         share @ ..=1.0 => Ok(share),
         percent => Err(format!("more than 1 is all noise: {text} % is {}", percent / 100.0)),
     }
+}
+
+/// A place of the picture, both coordinates in `[0,1]`.
+pub(super) fn place(text: &str) -> Result<Vec2, String> {
+    list(text)
+        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
+        .map(Vec2::from_array)
+        .ok_or_else(|| "expected two numbers from 0 to 1 like 0.25,0.7".to_owned())
 }
 
 /// `X,Y,WIDTH,HEIGHT` in pixels.

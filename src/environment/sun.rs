@@ -27,6 +27,13 @@ pub struct Sun {
 }
 
 impl Sun {
+    /// Unit direction towards it from the world of which the map is turned by `rotation_degrees`.
+    pub(crate) fn direction(&self, rotation_degrees: f64) -> Vec3 {
+        let (sine, cosine) = self.elevation_degrees.to_radians().sin_cos();
+        let (z, x) = (self.azimuth_degrees + rotation_degrees).to_radians().sin_cos();
+        DVec3::new(cosine * x, sine, cosine * z).as_vec3()
+    }
+
     /// Finds it; `None` on a black map.
     pub fn of(map: &Image) -> Option<Self> {
         let (width, height) = (map.width, map.height);

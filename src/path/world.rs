@@ -162,7 +162,7 @@ impl World {
     }
 
     /// The same as if there were no smooth solid glass, and whether there is any.
-    pub(super) fn transmittance_but_for_glass(&self, ray: &Ray) -> (Vec3, bool) {
+    pub(crate) fn transmittance_but_for_glass(&self, ray: &Ray) -> (Vec3, bool) {
         let _running = self.clock.as_ref().map(RayClock::start);
         let mut transmittance = Vec3::ONE;
         let mut meets_glass = false;

@@ -18,6 +18,7 @@ mod pass;
 mod progress;
 mod session;
 mod sharing;
+pub mod sun_placement;
 pub mod surface_map;
 mod view;
 mod view_probe;

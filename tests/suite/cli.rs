@@ -481,6 +481,8 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--noise -1", "must be above 0"),
         ("--env-intensity -1", "must not be negative"),
         ("--env-sun -1", "must not be negative"),
+        ("--sun-at 0.5,1.1", "two numbers from 0 to 1"),
+        ("--sun-at 0.5,0.5 --env-rotation 10", "cannot be used with"),
         ("--threads 1000000", "is not in 0..=1024"),
         ("--spp 1.5", "expected a whole number from 1 to 4294967295"),
         ("--camera 0 --eye 1,1,1 --target 0,0,0", "cannot be used with"),
@@ -515,6 +517,30 @@ fn a_camera_goes_by_its_name_or_its_number() {
     });
     assert_eq!(named, counted);
     assert_ne!(named, first);
+}
+
+#[test]
+fn the_sun_is_put_somewhere_by_turning_the_map() {
+    let bench = Bench::new();
+    let render = |rest: &str| {
+        let line = "render living-room --size 32x18 --spp 1 --gi exact -o a.exr";
+        let output = bench.command(&format!("{line} {rest}")).output().expect("the binary starts");
+        let said = text(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        (said, read_picture(&bench.path("a.exr")).expect("a picture"))
+    };
+    let (said, put) = render("--sun-at 0.9,0.9");
+    let degrees = said.split_once("turns the map by ").and_then(|(_, rest)| rest.split_once(' '));
+    let (degrees, _) = degrees.expect("the notice names the rotation");
+    let (_, turned) = render(&format!("--env-rotation {degrees}"));
+    assert_eq!(put.pixels, turned.pixels);
+    // The lower right corner is brighter by far than where the sun is elsewhere.
+    let (_, elsewhere) = render("--env-rotation 180");
+    let corner = |image: &Image| image.at(29, 16).iter().sum::<f32>();
+    assert!(corner(&put) > 5.0 * corner(&elsewhere), "{} {}", corner(&put), corner(&elsewhere));
+    // The sun comes through no window onto the ceiling.
+    let (said, _) = render("--sun-at 0.5,0.02");
+    assert!(said.contains("° above the horizon, cannot reach this place; it shines"), "{said}");
 }
 
 #[test]
@@ -557,6 +583,10 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
             "--camera sofa: office has cameras 0 to 2; `lightgrid info` names them",
         ),
         ("render open -o a.png --variant red".into(), "open: there is no variant red: it has none"),
+        (
+            "render open -o a.png --sun-at 0.5,0".into(),
+            "--sun-at 0.5,0: there is no surface for the sun to shine on, only the map",
+        ),
         ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
         ("info none.exr".into(), "none.exr: there is no such file"),
     ] {

@@ -8,9 +8,9 @@ use super::overlay::Overlay;
 use super::painted::{Legend, Painted, Range, scaled};
 use super::palette;
 use crate::app::document::Look;
-use crate::render::surface_map::{Spot, SurfaceMap};
 use crate::color::srgb_from_linear;
 use crate::radiance_cache::{CacheFacts, KnownCell};
+use crate::render::surface_map::{Spot, SurfaceMap};
 
 /// Draws one of the cache's overlays.
 pub(super) fn paint(

@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::environment::Environment;
+use crate::environment::sun::Sun;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
+use crate::path::World;
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::{Film, Pixel};
+use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
 
 use super::document::Look;
@@ -43,6 +48,10 @@ pub struct Sources<'a> {
     pub look: Option<(Look, f32)>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
+    /// What the map's sun may shine on.
+    pub world: &'a World,
+    /// The map's sun, unless the map is black.
+    pub sun: Option<&'a Sun>,
 }
 
 impl Sources<'_> {
@@ -59,12 +68,26 @@ impl Sources<'_> {
                 Range::Logarithmic,
                 "of the luminance",
             )),
+            Overlay::Sun => self.sunlit(),
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
             _ if overlay.is_of_cache() => {
                 Some(cache::paint(overlay, self.cache?, self.surfaces?, self.look))
             }
             _ => self.cells(overlay),
         }
+    }
+
+    fn sunlit(&self) -> Option<Painted> {
+        const SUNLIT: [u8; 3] = [255, 205, 70];
+        let (turns, _) = self.environment.rotation_and_intensity();
+        let (sun, degrees) = (self.sun?, 360.0 * f64::from(turns));
+        let is_lit = |spot: &&Spot| is_sunlit(self.world, sun, spot, degrees);
+        let color = |spot: &Option<Spot>| spot.as_ref().filter(is_lit).map(|_| SUNLIT);
+        let colors: Vec<_> = self.surfaces?.spots.par_iter().map(color).collect();
+        let count = colors.iter().flatten().count();
+        let percent = 100.0 * count as f32 / colors.len().max(1) as f32;
+        let name = format!("sunlit, {percent:.1} % of the pixels");
+        Some(Painted::new(colors, Legend::Names(vec![(SUNLIT, name)])))
     }
 
     fn layer(&self, overlay: Overlay) -> Option<Painted> {

@@ -27,6 +27,8 @@ pub enum Overlay {
     CacheRadiance,
     /// What has trained the cache's cells.
     CacheSamples,
+    /// What the map's sun shines on.
+    Sun,
     /// Samples of each pixel.
     Samples,
     /// Estimated error of each pixel.
@@ -41,7 +43,7 @@ pub enum Overlay {
 
 impl Overlay {
     /// All of them, in the order they are offered.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Cells,
         Self::Faces,
         Self::Learned,
@@ -54,6 +56,7 @@ impl Overlay {
         Self::CacheCells,
         Self::CacheRadiance,
         Self::CacheSamples,
+        Self::Sun,
         Self::Samples,
         Self::Error,
         Self::Albedo,
@@ -85,6 +88,7 @@ impl Overlay {
             Self::CacheCells => "Cells of the radiance cache",
             Self::CacheRadiance => "Radiance of the cache",
             Self::CacheSamples => "Training of the cache",
+            Self::Sun => "Sunlit surfaces",
             Self::Samples => "Samples",
             Self::Error => "Estimated error",
             Self::Albedo => "Albedo",
@@ -124,6 +128,9 @@ impl Overlay {
             Self::CacheSamples => {
                 "Samples that have trained each cell of the cache; dark where a larger cell or the global mean is used."
             }
+            Self::Sun => {
+                "Surfaces that see the brightest place of the map, through smooth glass, too."
+            }
             Self::Samples => "Samples each pixel has.",
             Self::Error => "Standard error of a pixel's luminance over its luminance.",
             Self::Albedo => "Directional albedo of the first surface.",
@@ -134,7 +141,7 @@ impl Overlay {
 
     /// Whether it is about the Light Grid.
     pub fn is_of_grid(self) -> bool {
-        self.needs_surfaces() && !self.is_of_cache()
+        self.needs_surfaces() && !self.is_of_cache() && self != Self::Sun
     }
 
     /// Whether it is about cells, hence needs the surfaces behind the pixels.

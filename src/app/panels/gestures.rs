@@ -11,7 +11,7 @@ use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{CLICK_DISTANCE, Drag, Step};
-use crate::app::interface::Tab;
+use crate::app::interface::{Tab, Tool};
 use crate::app::theme;
 use crate::render::surface_map::{Spot, look_at_place};
 
@@ -26,23 +26,47 @@ pub(super) fn show(
 ) {
     let is_free = !scope.interface.is_modal();
     let accepts = |at: Pos2| is_free && response.rect.contains(at) && !handle.contains(at);
-    let steps = Drag::follow_in(&mut scope.interface.drag, ui, CLICK_DISTANCE, accepts);
-    let modifiers = ui.input(|input| input.modifiers);
-    if scope.interface.is_marking {
-        mark_region(ui, whole, &steps, scope);
-        return;
+    let tool = scope.interface.tool;
+    let slack = if tool == Some(Tool::Sun) { 0.0 } else { CLICK_DISTANCE };
+    let steps = Drag::follow_in(&mut scope.interface.drag, ui, slack, accepts);
+    match tool {
+        Some(Tool::Region) => mark_region(ui, whole, &steps, scope),
+        Some(Tool::Sun) => put_sun(ui, rect, &steps, scope),
+        None => {
+            point(rect, response, ui.input(|input| input.modifiers), scope);
+            travel(ui, whole, response, &steps, scope);
+        }
     }
-    point(rect, response, modifiers, scope);
-    travel(ui, whole, response, &steps, scope);
+}
+
+/// Says what a tool does.
+fn show_hint(ui: &Ui, over: Rect, hint: &str) {
+    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+    let seen = over.intersect(ui.max_rect());
+    let top = Pos2::new(seen.center().x, seen.top() + 14.0);
+    theme::badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+}
+
+/// Lets the sun follow the pointer while a button is held.
+fn put_sun(ui: &Ui, rect: Rect, steps: &[Step], scope: &mut Scope<'_>) {
+    show_hint(ui, rect, "Click or drag where the sun is to shine");
+    let held = scope.interface.drag.and_then(|drag| drag.span()).map(|[_, at]| at);
+    let end = steps.iter().find_map(Step::end);
+    if held.is_some() || end.is_some() {
+        scope.interface.keep_turning(ui.ctx());
+    }
+    if end.is_some() {
+        scope.interface.tool = None;
+    }
+    let place = end.or(held.filter(|_| !steps.is_empty()));
+    let place = place.filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
+    let command = |place| Command::PutSun { place, is_last: end.is_some() };
+    scope.commands.extend(place.map(command));
 }
 
 /// Lets a drag mark the part that is to be rendered.
 fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
-    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
-    let hint = "Drag over the part that is to be rendered";
-    let seen = whole.intersect(ui.max_rect());
-    let top = Pos2::new(seen.center().x, seen.top() + 14.0);
-    theme::badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+    show_hint(ui, whole, "Drag over the part that is to be rendered");
     let marked = |[from, to]: [Pos2; 2]| Rect::from_two_pos(from, to).intersect(whole);
     if let Some(span) = scope.interface.drag.and_then(|drag| drag.span()) {
         let stroke = Stroke::new(1.5, theme::ACCENT);
@@ -51,7 +75,7 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
     for step in steps {
         let Step::End { from, to } = *step else { continue };
         let marked = marked([from, to]);
-        scope.interface.is_marking = false;
+        scope.interface.tool = None;
         if marked.width() >= 4.0 && marked.height() >= 4.0 {
             let (low, high) = (place_of(whole, marked.min), place_of(whole, marked.max));
             scope.document.region = Some([low.x, low.y, high.x, high.y]);

@@ -215,7 +215,7 @@ fn environment(
             let way: f32 = steps.iter().map(Step::right).sum();
             let degrees = way / response.rect.width() * 360.0;
             document.rotation_degrees = (document.rotation_degrees + degrees).rem_euclid(360.0);
-            interface.keep_moving(ui.ctx());
+            interface.keep_turning(ui.ctx());
         }
         response.on_hover_text(
             "Drag to turn the map. The middle of the picture is seen along +X, the left quarter \
@@ -248,13 +248,17 @@ fn environment(
     let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
     let slider = slider.clamping(SliderClamping::Never);
     let hint = "Rotates the map about the vertical axis";
-    let is_turned = theme::set(ui, "Rotation", hint, slider).dragged();
+    if theme::set(ui, "Rotation", hint, slider).dragged() {
+        interface.keep_turning(ui.ctx());
+    }
     // Somebody may type -90.
     if !(0.0..=360.0).contains(degrees) {
         *degrees = degrees.rem_euclid(360.0);
     }
+    let words = ("Put the sun…", "Then click or drag in the picture where it is to shine (L)");
+    button(ui, words, commands, Command::ToggleSun);
     let slider = factor(&mut document.intensity);
-    if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() || is_turned {
+    if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() {
         interface.keep_moving(ui.ctx());
     }
     let hint =

@@ -359,10 +359,7 @@ fn wipe(ui: &Ui, (rect, of_left): (Rect, Rect), picture: Shape, interface: &mut 
     let drag = &mut interface.wipe_drag;
     let seen = handle.intersect(ui.clip_rect());
     let steps = Drag::follow_in(drag, ui, 0.0, |at| is_free && seen.contains(at));
-    let ended = steps.iter().find_map(|step| match step {
-        Step::End { to, .. } => Some(*to),
-        Step::Move { .. } => None,
-    });
+    let ended = steps.iter().find_map(Step::end);
     let held = drag.and_then(|drag| drag.span()).map(|[_, at]| at);
     if let Some(at) = held.or(ended) {
         interface.wipe = ((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0);

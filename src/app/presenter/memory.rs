@@ -256,6 +256,8 @@ impl Memory {
             cache: snapshot.cache.as_deref().ok(),
             look,
             tile: order.tile,
+            world: &snapshot.request.world,
+            sun: order.sun.as_ref(),
         };
         let painted = sources.paint(overlay)?;
         let colors = order.developer.upload_overlay(&painted.colors, session.film.width, picture);

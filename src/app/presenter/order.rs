@@ -9,6 +9,7 @@ use crate::app::overlays::{Label, Legend, Overlay};
 use crate::app::worker::{Activity, Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::environment::sun::Sun;
 use crate::image::Image;
 use crate::tone::WhiteBalance;
 
@@ -31,6 +32,8 @@ pub(crate) struct Order {
     pub look: Option<Look>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
+    /// The sun of the map, if the overlay asks for it.
+    pub sun: Option<Sun>,
     /// Kept pictures that are compared.
     pub compared: Option<Comparison>,
 }
@@ -45,6 +48,7 @@ impl PartialEq for Order {
             && self.overlay == other.overlay
             && self.look == other.look
             && self.tile == other.tile
+            && self.sun == other.sun
             && self.compared == other.compared
     }
 }
@@ -148,6 +152,7 @@ pub(super) mod tests {
             overlay: None,
             look: None,
             tile: None,
+            sun: None,
             compared: None,
         }
     }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Parser as _;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::cli::camera::CameraArguments;
 use crate::cli::choices::SceneArguments;
@@ -52,6 +52,10 @@ pub(in crate::cli) struct RenderArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     pub(super) env_rotation: f64,
+    /// Turns the map so that its sun shines on the surface at this place of the picture, X,Y in [0,1] from
+    /// the left and the top, or on the nearest that it can reach.
+    #[arg(long, value_parser = values::place, conflicts_with = "env_rotation", allow_hyphen_values = true, value_name = "X,Y", help_heading = "Environment")]
+    pub(super) sun_at: Option<Vec2>,
     /// What the camera sees of the map: `map`, `none` (pictures have an alpha channel), `blur:DEGREES`, or a
     /// colour R,G,B (linear radiance).
     #[arg(long, value_parser = values::background, allow_hyphen_values = true, value_name = "WHAT", help_heading = "Environment")]

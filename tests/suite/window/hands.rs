@@ -17,6 +17,7 @@ fn a_material_is_hidden_and_comes_back_and_walls_stop_the_camera() {
         "view office --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings w.json",
     );
     hide_and_undo(&desk);
+    put_sun(&desk);
     desk.answer("ctrl+o", "crack");
     desk.save_until("closed room", |_, of| (of("scene") == "crack").then_some(()));
     orbit(&desk);
@@ -46,6 +47,24 @@ fn hide_and_undo(desk: &Desk) {
     });
     println!("changed by {hidden:.3}, and back by {back:.3}");
     assert!(back < 0.4 * hidden, "{back} of {hidden} is left");
+}
+
+/// Puts the sun on the floor by a click, and takes that back.
+fn put_sun(desk: &Desk) {
+    let turned = |is_so: fn(f64) -> bool| {
+        desk.save_until("picture", |_, of| {
+            let degrees: f64 = of("env_rotation_degrees").parse().expect("a number");
+            Some(is_so(degrees).then_some(()))
+        })
+    };
+    desk.wait_for("sun on the floor", || {
+        desk.xdotool("key l mousemove 560 500 click 1");
+        turned(|degrees| degrees > 0.0)
+    });
+    desk.wait_for("sun where it was", || {
+        desk.xdotool("key ctrl+z");
+        turned(|degrees| degrees == 0.0)
+    });
 }
 
 /// Of the store room `crack`: 4 x 2.5 x 3 metres, with a slit that no camera comes through.
