@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::device;
+use super::device::TakeOver;
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use crate::alarm::Alarm;
@@ -25,7 +25,7 @@ use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, UploadedScene};
+use crate::render::gpu::UploadedScene;
 use crate::render::{Driver, Figures, Session, cut_off_notice};
 use crate::scene::Camera;
 use crate::terminal::notice;
@@ -76,13 +76,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;
     progress.finish();
     notices.iter().for_each(notice);
-    let gpu = device::open(
-        arguments.device,
-        arguments.adapter.as_deref(),
-        (arguments.rays, arguments.schedule),
-        &mut notices,
-    )?;
-    let uploaded = device::upload(arguments.device, gpu, (&world, &environment), &mut notices)?;
+    let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
+    let gpu = cpu.open(arguments.adapter.as_deref(), arguments.rays)?;
+    let gpu = gpu.map(|gpu| gpu.with_schedule(arguments.schedule));
+    let on_gpu = gpu.map(|gpu| UploadedScene::new(&gpu, &world, &environment));
+    let uploaded = cpu.renders_instead(on_gpu.transpose())?;
     let job =
         Job { world: &world, environment: &environment, phases, notices, uploaded, interrupt };
     match frames {
@@ -99,9 +97,8 @@ fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     let [width, height] = arguments.size();
     let has_layers = arguments.wants_surfaces();
     let [film, mut writing] = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    if has_layers
-        && (arguments.part.is_some() || arguments.picture.is_denoised(arguments.pictures()))
-    {
+    let is_denoised = arguments.picture.is_denoised(&arguments.pictures());
+    if has_layers && (arguments.part.is_some() || is_denoised) {
         writing = BYTES_OF_COPY;
     }
     if arguments.seconds.is_some() {
@@ -154,16 +151,17 @@ impl Job<'_> {
         let rule = arguments.stop_rule();
         let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
-        let uploaded = self.uploaded.as_ref();
         let film_bytes = needed_bytes(arguments)[0];
         let mut beside = Beside::new(arguments, world, environment, &view, film_bytes);
-        let session =
-            device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
+        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
+        let start = |on| Session::on(world, environment, view.clone(), Some(on));
+        let on_gpu = cpu.renders_instead(self.uploaded.as_ref().map(start).transpose())?;
+        let session = on_gpu.unwrap_or_else(|| Session::new(world, environment, view));
         let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), &notices);
         assignment.set_metadata(record.metadata());
-        let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
+        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
         let begun = counted.map_or(Ok(()), |counted| {
             let taken_up = driver.session.continue_learning(counted);
@@ -193,7 +191,7 @@ impl Job<'_> {
         let (asked, mut arguments) = (arguments, Cow::Borrowed(arguments));
         if known.is_some() {
             // What the first frame has is what all have.
-            arguments.to_mut().picture.take_exposure(&film, asked.pictures());
+            arguments.to_mut().picture.take_exposure(&film, &asked.pictures());
         }
         let figures = driver.session.figures();
         let done = (&*film, &figures, beside.seconds);
@@ -208,7 +206,7 @@ impl Job<'_> {
             return Error::all(failures).map(|()| Vec::new());
         }
         if let Some(known) = known {
-            known.exposure = Some(arguments.picture.exposure());
+            known.exposure = Some(arguments.picture.exposure);
             known.counted = driver.session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
@@ -271,7 +269,7 @@ impl Job<'_> {
                     break;
                 }
             }
-            known.exposure.take().into_iter().for_each(|ev| of_frame.picture.set_exposure(ev));
+            of_frame.picture.exposure = known.exposure.take().unwrap_or(of_frame.picture.exposure);
             if self.interrupt.was_signalled() {
                 notice(format_args!("frame {number} was ended early and is the last"));
                 break;
@@ -338,26 +336,6 @@ pub(super) fn start_threads(threads: u16) -> Result<()> {
         .thread_name(|i| format!("render {i}"))
         .build_global()
         .map_err(|e| cannot(&e))
-}
-
-/// Lets the CPU take over from a GPU that fails, unless that was asked for by name.
-struct TakeOver<'a> {
-    device: DeviceChoice,
-    notices: &'a mut Notices,
-}
-
-impl TakeOver<'_> {
-    /// `None` if the CPU has to go on in place of this outcome.
-    fn goes_on<T>(&mut self, session: &mut Session<'_>, outcome: Result<T>) -> Result<Option<T>> {
-        match outcome {
-            Err(failure) if self.device == DeviceChoice::Auto => {
-                device::say(self.notices, format!("{failure}; the CPU goes on"));
-                session.continue_on_cpu();
-                Ok(None)
-            }
-            outcome => outcome.map(Some),
-        }
-    }
 }
 
 /// Runs the session until a rule or the user says stop. When the seconds are over, the pass under way ends

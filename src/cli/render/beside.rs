@@ -46,7 +46,7 @@ impl<'a> Beside<'a> {
             && is_one
             && view.sampling == Sampling::Adaptive
             && view.width.min(view.height) >= MIN_SIZE
-            && arguments.picture.is_denoised(arguments.pictures())
+            && arguments.picture.is_denoised(&arguments.pictures())
             && suits(world, view)
             && memory::check(film_bytes).is_ok();
         Self {
@@ -54,7 +54,7 @@ impl<'a> Beside<'a> {
             environment,
             is_wanted,
             wants_exact: arguments.noise.is_some()
-                || arguments.picture.shows_rendered(arguments.pictures()),
+                || arguments.picture.shows_rendered(&arguments.pictures()),
             picture: None,
             seconds: 0.0,
             asked: arguments.stop_rule(),
