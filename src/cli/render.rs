@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
     arguments.check_fog(&world.scene, &mut notices);
-    let cut_off = cut_off_notice(&world, &environment, &arguments.view(&world, camera.clone()));
+    let cut_off = cut_off_notice((&world, &environment), &arguments.view(&world, camera.clone()));
     cut_off.into_iter().for_each(|sentence| notices.add(sentence));
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
@@ -148,13 +148,12 @@ impl Job<'_> {
         let spare: Vec<u8> =
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
-        let rule = arguments.stop_rule();
-        let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
+        let mut assignment = RenderJob::open(arguments, (world, environment), &view)?;
         assignment.say(&mut notices);
         let film_bytes = needed_bytes(arguments)[0];
-        let mut beside = Beside::new(arguments, world, environment, &view, film_bytes);
+        let mut beside = Beside::new(arguments, (world, environment), &view, film_bytes);
         let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
-        let start = |on| Session::on(world, environment, view.clone(), Some(on));
+        let start = |on| Session::on((world, environment), view.clone(), Some(on));
         let on_gpu = cpu.renders_instead(self.uploaded.as_ref().map(start).transpose())?;
         let session = on_gpu.unwrap_or_else(|| Session::new(world, environment, view));
         let mut driver = assignment.driver(session);

@@ -16,6 +16,9 @@ use crate::scene::needs::{SceneFeatures, SceneNeeds};
 use crate::scene::surface::{SurfacePoint, alpha_at};
 use crate::scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, TextureImage};
 
+/// A scene and the map that lights it.
+pub type Lit<'a> = (&'a World, &'a Environment);
+
 /// Everything about the scene that paths ask for.
 pub struct World {
     /// The scene.

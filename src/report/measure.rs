@@ -32,7 +32,7 @@ impl<'a> Place<'a> {
     /// A session of one method.
     pub(super) fn session(&self, settings: &Settings, seed: u32) -> Result<Session<'a>> {
         let view = settings.view(self.camera, self.frame, seed);
-        Session::on(self.world, self.environment, view, self.upload)
+        Session::on((self.world, self.environment), view, self.upload)
     }
 
     /// Learns and renders a little, so that all kernels are built.

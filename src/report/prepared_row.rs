@@ -64,7 +64,7 @@ impl PreparedRow {
             None => framing::frame(&world, aspect),
         };
         let digest =
-            digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
+            digest::of_picture((&world, &lights[0].environment), &camera, &plan.effort.frame)?;
         Ok(Self { title: row.title.clone(), world, camera, lights, map_size, notices, digest })
     }
 
