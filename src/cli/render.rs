@@ -247,7 +247,7 @@ impl Job<'_> {
         let (videos, pictures): (Vec<_>, Vec<_>) =
             arguments.outputs.iter().partition(|path| frames::is_video(path));
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
-        reel.iter().for_each(|reel| self.interrupt.has_frames_in(reel.folder()));
+        reel.iter().for_each(|reel| self.interrupt.has_frames_in(&reel.folder));
         let mut failures = Vec::new();
         let mut known = Known::default();
         let mut progress = Progress::start("");
@@ -346,10 +346,10 @@ fn work<'a>(
     progress: &Progress,
     cpu: &mut TakeOver<'_>,
 ) -> Result<()> {
-    let alarm = Alarm::start(Arc::clone(interrupt.asked()));
+    let alarm = Alarm::start(Arc::clone(&interrupt.asked));
     loop {
         progress.show(&driver.session, &driver.rule, (beside.counted(), beside.seconds));
-        if beside.advance(driver, interrupt.asked())? {
+        if beside.advance(driver, &interrupt.asked)? {
             continue;
         }
         let step = assignment.step(driver, interrupt, &alarm, cpu.notices);

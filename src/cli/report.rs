@@ -253,7 +253,7 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
             folder: &folder,
             references: arguments.references.as_deref(),
             adapter: arguments.adapter.as_deref(),
-            cancel: cancel.asked(),
+            cancel: &cancel.asked,
             progress: &|what| progress.say(what),
             tell: &|what| progress.tell(&what),
         },
@@ -302,7 +302,7 @@ fn tables(arguments: &SatArguments) -> Result<()> {
         arguments.output.as_deref(),
         |case| {
             progress.say(format!("{}, {}x{}", case.title, case.size.0, case.size.1));
-            is_set(cancel.asked())
+            is_set(&cancel.asked)
         },
         |measured| progress.tell(&format!("{}: {}", measured.title, measured.report)),
     );

@@ -27,7 +27,8 @@ const TILE: u32 = 8;
 #[derive(Clone, PartialEq)]
 pub(crate) struct LinearPicture {
     film: DeviceFilm,
-    is_live: bool,
+    /// Whether it may change by itself.
+    pub(crate) is_live: bool,
 }
 
 impl LinearPicture {
@@ -39,11 +40,6 @@ impl LinearPicture {
     /// Sums that nobody will change.
     fn fixed(film: DeviceFilm) -> Self {
         Self { film, is_live: false }
-    }
-
-    /// Whether it may change by itself.
-    pub(crate) fn is_live(&self) -> bool {
-        self.is_live
     }
 
     /// Its sums.

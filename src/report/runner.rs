@@ -88,7 +88,7 @@ impl Runner<'_> {
         self.report.rows.push(report);
         let reference = self.context.file_reference.is_none().then(|| {
             Reference::open(
-                self.context.store.references(),
+                &self.context.store.references,
                 prepared.digest,
                 self.context.plan.effort.frame.size,
             )
@@ -280,7 +280,7 @@ impl Runner<'_> {
     }
 
     fn write_pages(&mut self) -> Result<()> {
-        super::pages::write(&self.report, self.context.store.root())?;
+        super::pages::write(&self.report, &self.context.store.root)?;
         self.pages_written = Some(Instant::now());
         Ok(())
     }

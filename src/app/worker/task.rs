@@ -453,7 +453,7 @@ impl<'a> PictureTask<'a> {
             request,
         });
         self.published = Instant::now();
-        if !self.preview.rests() {
+        if !self.preview.rests {
             let cost = (self.published - start).saturating_sub(reading);
             self.publish_gap = gap_after(cost);
         }

@@ -201,7 +201,8 @@ fn said(text: &[u8]) -> String {
 
 /// A folder for the frames of a video, gone when this value is.
 pub(super) struct Reel {
-    folder: PathBuf,
+    /// Where they are.
+    pub(super) folder: PathBuf,
     /// Frames asked for so far.
     count: u32,
 }
@@ -215,11 +216,6 @@ impl Reel {
         let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", name_of_process()));
         fs::create_dir(&folder).map_err(|error| Error::at(&folder, error))?;
         Ok(Self { folder, count: 0 })
-    }
-
-    /// Where they are.
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// Where the next frame is to be written: in the place of the last if that could not be, for videos are

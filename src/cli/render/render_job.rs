@@ -183,7 +183,7 @@ impl RenderJob {
         if driver.has_samples() {
             interrupt.keep();
         }
-        driver.step(interrupt.asked())
+        driver.step(&interrupt.asked)
     }
 
     /// Writes the checkpoint if it is time, and has the next pass cut short when it will be so again or

@@ -23,7 +23,8 @@ pub(super) struct Buffers {
     pub(super) tree: Option<wgpu::Tlas>,
     /// Texels of a row of every array, as a power of two.
     width_log2: u32,
-    version: u64,
+    /// Changes whenever another buffer or array takes the place of one.
+    pub(super) version: u64,
     staging: Arc<Mutex<Option<Buffer>>>,
     bytes_read: Arc<AtomicU64>,
 }
@@ -40,7 +41,7 @@ impl Buffers {
         Self {
             gpu: gpu.clone(),
             by_name: BTreeMap::new(),
-            prefers_buffers: gpu.prefers_buffers(),
+            prefers_buffers: gpu.prefers_buffers,
             arrays: BTreeMap::new(),
             tree: None,
             width_log2,
@@ -276,11 +277,6 @@ impl Buffers {
     /// Bytes read back so far.
     pub(super) fn bytes_read(&self) -> u64 {
         self.bytes_read.load(Ordering::Relaxed)
-    }
-
-    /// Changes whenever another buffer or array takes the place of one.
-    pub(super) fn version(&self) -> u64 {
-        self.version
     }
 
     fn most_bytes(&self) -> u64 {

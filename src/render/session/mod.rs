@@ -464,7 +464,7 @@ impl<'a> Session<'a> {
     /// work.
     fn take_up_distributions(&mut self) -> Result<()> {
         let grid = self.state.tiles.grid();
-        let generation = grid.map_or(0, LightGrid::generation);
+        let generation = grid.map_or(0, |grid| grid.generation);
         if generation != self.state.sequence.generation {
             // Pixels that are ahead begin later in it.
             self.state.sequence = Sequence { generation, first_sample: self.state.samples };
