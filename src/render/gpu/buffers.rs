@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+use wgpu::{Buffer, BufferUsages};
 
+use super::buffer::buffer;
 use super::device::Gpu;
 use super::shader::{ARRAYS, ArrayKind, ArrayPlaces, TexelFormat};
 use crate::error::{Error, Result};
@@ -303,12 +304,8 @@ fn for_want_of(bytes: u64, what: &str, error: &Error) -> Error {
 }
 
 fn create(device: &wgpu::Device, name: &str, bytes: u64) -> Buffer {
-    device.create_buffer(&BufferDescriptor {
-        label: Some(name),
-        size: bytes.next_multiple_of(16).max(16),
-        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    })
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+    buffer(device, Some(name), bytes.next_multiple_of(16).max(16), usage)
 }
 
 fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {

@@ -8,6 +8,7 @@ mod acceleration;
 #[cfg(feature = "window")]
 mod background_compile;
 mod bound;
+mod buffer;
 mod buffers;
 mod cast;
 pub(crate) mod constants;
@@ -67,6 +68,7 @@ pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
     AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
+pub(crate) use buffer::buffer;
 pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
