@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::{interrupt, render, values};
 use crate::bench::{Options, Subject, run as measure};
 use crate::environment::{Environment, EnvironmentOptions};
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
@@ -99,8 +99,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     };
     let (map, notices) = crate::sources::map(&arguments.env)?;
     notices.iter().for_each(|sentence| progress.tell(&format!("notice: {sentence}")));
-    let environment = Environment::new(map, &EnvironmentOptions::default())
-        .map_err(|e| Error::at(&arguments.env, e))?;
+    let environment = Environment::new(map, &EnvironmentOptions::default()).at(&arguments.env)?;
     let subject = |name: &&str| {
         let world = World::new(crate::sources::scene_with(name, &arguments.of_scene.options())?);
         Ok(Subject { name: (*name).to_owned(), world, environment: environment.clone() })

@@ -17,7 +17,7 @@ use super::interrupt::Interrupt;
 use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::exr_encoder_bytes;
 use crate::light_grid::LearningGrid;
 use crate::memory;
@@ -305,8 +305,7 @@ fn load_environment(arguments: &RenderArguments) -> Result<(Environment, Notices
     let (map, notices) = crate::sources::map(arguments.map())?;
     let load_seconds = lap(start);
     let start = Instant::now();
-    let environment = Environment::new(map, &arguments.environment_options())
-        .map_err(|e| Error::at(arguments.map(), e))?;
+    let environment = Environment::new(map, &arguments.environment_options()).at(arguments.map())?;
     Ok((environment, notices, load_seconds, lap(start)))
 }
 

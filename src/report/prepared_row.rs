@@ -9,7 +9,7 @@ use super::measure::Place;
 use super::plan::{Frame, Plan, Row, Settings};
 use crate::digest::Digest;
 use crate::environment::{Environment, EnvironmentOptions};
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Notices, Result};
 use crate::light_grid::LightGrid;
 use crate::path::{World, framing};
 use crate::render::{Sampling, gpu};
@@ -54,8 +54,7 @@ impl PreparedRow {
             }
             let map = map.clone();
             let start = Instant::now();
-            let environment =
-                Environment::new(map, &options).map_err(|e| Error::at(&row.map, e))?;
+            let environment = Environment::new(map, &options).at(&row.map)?;
             let seconds = start.elapsed().as_secs_f64();
             lights.push(Light { options, environment, seconds, upload: None });
         }

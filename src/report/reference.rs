@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::measure::Place;
 use super::plan::{MIN_PICTURES, Settings};
 use crate::digest::Digest;
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::{Image, read_with_linearity, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
@@ -122,7 +122,7 @@ impl Reference {
     }
 
     fn write(&self) -> Result<()> {
-        let header = serde_json::to_string(&self.facts).map_err(|e| Error::at(&self.path, e))?;
+        let header = serde_json::to_string(&self.facts).at(&self.path)?;
         write_beside_and_rename(&self.path, |file| {
             writeln!(file, "{header}")?;
             let numbers = self.sums.as_flattened().iter().chain(self.squares.as_flattened());

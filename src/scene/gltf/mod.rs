@@ -47,7 +47,7 @@ use std::sync::PoisonError;
 use glam::DAffine3;
 use gltf::json;
 
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
 use crate::scene::needs::is_emitter;
 use crate::scene::{Frame, Outlines, Scene, SceneOptions};
@@ -79,7 +79,7 @@ pub fn load(path: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
-    let bytes = read_file(path).map_err(|cause| Error::at(path, cause))?;
+    let bytes = read_file(path).at(path)?;
     if looks_like_picture(&bytes) {
         return Err(Error::at(path, "is a picture, where a scene is expected; --env takes a map"));
     }
@@ -87,8 +87,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
         return Err(Error::at(path, IS_A_FILM));
     }
     let base_dir = path.parent().unwrap_or(Path::new(""));
-    let mut scene =
-        read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
+    let mut scene = read(&bytes, Some(base_dir), options).at(path)?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(scene)
 }
@@ -99,7 +98,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
     let options = SceneOptions::default();
-    let mut scene = read(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
+    let mut scene = read(bytes, base_dir, &options).at(name)?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
