@@ -29,6 +29,18 @@ impl Error {
     }
 }
 
+/// Says which file a failure is about.
+pub(crate) trait At<T> {
+    /// With an error that is [`Error::at`] this file.
+    fn at(self, path: impl AsRef<Path>) -> Result<T>;
+}
+
+impl<T, E: fmt::Display> At<T> for std::result::Result<T, E> {
+    fn at(self, path: impl AsRef<Path>) -> Result<T> {
+        self.map_err(|cause| Error::at(path, cause))
+    }
+}
+
 impl Error {
     /// Whether nothing failed, else all that did.
     ///

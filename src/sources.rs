@@ -4,7 +4,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use crate::environment::sky;
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::Image;
 use crate::image::{extension, looks_like_picture, looks_like_scene, open_file, read_map};
 use crate::memory;
@@ -34,7 +34,7 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
             return Err(Error::at(name, format!("there is no variant {variant}: it has none")));
         }
         let mut scene = builtin::build(name)?;
-        scene.hide(&options.hide).map_err(|cause| Error::at(name, cause))?;
+        scene.hide(&options.hide).at(name)?;
         scene
     } else {
         gltf::load_with(Path::new(name), options)?
@@ -50,7 +50,7 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
         }
     }
     if options.edits.iter().any(|(_, edit)| edit.hidden) {
-        scene.check_shown().map_err(|cause| Error::at(name, cause))?;
+        scene.check_shown().at(name)?;
     }
     Ok(scene)
 }
@@ -124,14 +124,14 @@ pub fn map(name: &str) -> Result<(Image, Notices)> {
     let loaded = read_map(Path::new(name))?;
     // The tables made of it take as much again.
     let bytes = loaded.image.pixels.len() * size_of::<[f32; 3]>();
-    memory::check(bytes as u64).map_err(|cause| Error::at(name, cause))?;
+    memory::check(bytes as u64).at(name)?;
     Ok((loaded.image, loaded.notices))
 }
 
 fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
     let (sky_name, (width, height)) = sky_and_size(name, rest)?;
     memory::check(2 * u64::from(width) * u64::from(height) * size_of::<[f32; 3]>() as u64)
-        .map_err(|cause| Error::at(name, cause))?;
+        .at(name)?;
     sky::build(sky_name, width, height)
 }
 
@@ -139,7 +139,7 @@ fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
 fn sky_and_size<'a>(name: &str, rest: &'a str) -> Result<(&'a str, (u32, u32))> {
     let (sky_name, (width, height)) = match rest.split_once('@') {
         None => (rest, SKY_SIZE),
-        Some((sky_name, size)) => (sky_name, size_pair(size).map_err(|e| Error::at(name, e))?),
+        Some((sky_name, size)) => (sky_name, size_pair(size).at(name)?),
     };
     if width > MAX_SKY_SIZE.0 || height > MAX_SKY_SIZE.1 {
         let (w, h) = MAX_SKY_SIZE;

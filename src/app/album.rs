@@ -15,7 +15,7 @@ use super::document::Document;
 use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels, SMALL_WIDTH};
 use super::screen::color_image;
 use super::settings_file;
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
 use crate::output::record::to_json;
 use crate::scene::SceneOptions;
@@ -91,7 +91,7 @@ impl Album {
         let place = file.clone();
         self.send(move || {
             if let Some(folder) = file.parent() {
-                std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
+                std::fs::create_dir_all(folder).at(folder)?;
             }
             let image = pixels.get().map_err(Error::new)?;
             let (layers, preview) = (Vec::new(), Some(&small));

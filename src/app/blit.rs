@@ -7,7 +7,7 @@ use egui::{PaintCallbackInfo, Pos2, Rect, Shape};
 use egui_wgpu::{Callback, CallbackResources, CallbackTrait, ScreenDescriptor};
 
 use crate::develop::DisplayTexture;
-use crate::render::gpu::Gpu;
+use crate::render::gpu::{Gpu, buffer};
 
 /// What draws pictures on one device into one format.
 pub(super) struct Blit {
@@ -136,15 +136,11 @@ impl CallbackTrait for Drawn {
             [left, bottom, 0.0, 1.0],
             [right, bottom, 1.0, 1.0_f32],
         ];
-        let buffer = self.corners.get_or_init(|| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("blit"),
-                size: size_of_val(&corners) as u64,
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
+        let vertices = self.corners.get_or_init(|| {
+            let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
+            buffer(device, Some("blit"), size_of_val(&corners) as u64, usage)
         });
-        queue.write_buffer(buffer, 0, bytemuck::cast_slice(&corners));
+        queue.write_buffer(vertices, 0, bytemuck::cast_slice(&corners));
         Vec::new()
     }
 

@@ -20,10 +20,12 @@ pub(crate) struct Run {
 /// All runs of this window, newest last.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Convergence {
-    runs: Vec<Run>,
+    /// Runs, oldest first; the last one is going on.
+    pub runs: Vec<Run>,
     /// Runs by now, those that are no longer kept included.
     count: usize,
-    plain: Option<Run>,
+    /// The plain half of a split view.
+    pub plain: Option<Run>,
     /// Whether the plot's axis is samples rather than seconds.
     pub by_samples: bool,
 }
@@ -52,16 +54,6 @@ impl Convergence {
         let of_plain = || Run { name: "plain".to_owned(), number, points: plain.clone() };
         self.plain = (!plain.is_empty()).then(of_plain);
     }
-
-    /// Runs, oldest first; the last one is going on.
-    pub(crate) fn runs(&self) -> &[Run] {
-        &self.runs
-    }
-
-    /// The plain half of a split view.
-    pub(crate) fn plain(&self) -> Option<&Run> {
-        self.plain.as_ref()
-    }
 }
 
 /// What a person calls a way of sampling.
@@ -83,7 +75,7 @@ mod tests {
             let point =
                 |i| Point { seconds: seconds + i as f64, samples: 1.0, noise: 0.5, error: None };
             convergence.add(Sampling::Plain, &[(0..points).map(point).collect(), Vec::new()]);
-            let runs = convergence.runs().iter();
+            let runs = convergence.runs.iter();
             runs.map(|run| (run.number, run.points.len())).collect::<Vec<_>>()
         };
         assert_eq!(add(1.0, 1), [(1, 1)]);

@@ -14,7 +14,8 @@ use crate::scene::SceneOptions;
 /// Kept pictures, oldest first.
 #[derive(Default)]
 pub(crate) struct History {
-    list: Vec<KeptPicture>,
+    /// All of them.
+    pub(crate) list: Vec<KeptPicture>,
     count: u32,
     album: Option<Album>,
     /// What is asked of the files of scenes.
@@ -107,11 +108,6 @@ impl History {
         self.list.get(index)
     }
 
-    /// All of them.
-    pub(crate) fn list_mut(&mut self) -> &mut [KeptPicture] {
-        &mut self.list
-    }
-
     /// Drops one, and its file.
     pub(crate) fn remove(&mut self, index: usize) {
         let kept = self.list.remove(index);
@@ -133,7 +129,7 @@ mod tests {
             let small = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
             history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
         }
-        assert_eq!(history.list_mut().len(), MAX_PICTURES);
+        assert_eq!(history.list.len(), MAX_PICTURES);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
         history.remove(0);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
@@ -164,9 +160,9 @@ mod tests {
         // Before the earlier ones are taken over.
         keep(&mut history);
         assert_eq!(history.take_over(earlier), MAX_PICTURES);
-        assert_eq!(history.list_mut().len(), MAX_PICTURES + 1);
+        assert_eq!(history.list.len(), MAX_PICTURES + 1);
         keep(&mut history);
-        let names: Vec<_> = history.list_mut().iter().map(|kept| kept.name.clone()).collect();
+        let names: Vec<_> = history.list.iter().map(|kept| kept.name.clone()).collect();
         assert_eq!(names[0], "Picture 3");
         assert_eq!(names[MAX_PICTURES - 1], format!("Picture {}", MAX_PICTURES + 2));
         history.finish();

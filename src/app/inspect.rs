@@ -61,7 +61,8 @@ pub(super) struct Inspector {
     environment: Option<Arc<Environment>>,
     learned: Option<(Arc<LightGrid>, Vec<f32>)>,
     source: Option<(Vec2, u64)>,
-    busy: bool,
+    /// Whether a truth is being measured.
+    pub(super) busy: bool,
 }
 
 impl Inspector {
@@ -82,11 +83,6 @@ impl Inspector {
     /// Probability of each tile summed over all learned distributions, `None` before anything was learned.
     pub(super) fn learned(&self) -> Option<&[f32]> {
         self.learned.as_ref().map(|(_, sums)| &sums[..])
-    }
-
-    /// Whether a truth is being measured.
-    pub(super) fn is_busy(&self) -> bool {
-        self.busy
     }
 
     /// Forgets everything: another scene or map is shown, and what is known of the last one is large.

@@ -297,7 +297,7 @@ impl Interface {
     /// Pixels of the screen for one of a picture of this size, where it is magnified.
     pub(super) fn magnification(&self, size: PictureSize) -> Option<f32> {
         let fitting = self.fitting(size).filter(|_| self.zoom.is_some())?;
-        Some(self.zoom.times() * fitting)
+        Some(self.zoom.times * fitting)
     }
 
     /// The same where it fits.

@@ -9,7 +9,7 @@ use super::document::Document;
 use super::threads::{Wake, lock, spawn};
 use crate::environment::sun::{Sun, SunTexels, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::{Image, catch_panic};
 use crate::memory;
 use crate::path::World;
@@ -132,8 +132,7 @@ impl LoadedMap {
     ) -> Result<Self> {
         let start = Instant::now();
         let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
-        let environment =
-            Environment::new(map, &options).map_err(|cause| Error::at(name, cause))?;
+        let environment = Environment::new(map, &options).at(name)?;
         let seconds = [seconds_of_reading, start.elapsed().as_secs_f64()];
         let preview = environment.map().shrunk(256);
         let count = environment.tile_count() as usize;

@@ -62,7 +62,7 @@ impl Rendering {
         let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole()) else {
             return false;
         };
-        let (main, geometry) = (&snapshot.main, snapshot.request.world.geometry());
+        let (main, geometry) = (&snapshot.main, &snapshot.request.world.geometry);
         let is_new = self.dark.as_ref().is_none_or(|said| !Arc::ptr_eq(said, geometry));
         let is_dark = main.on_device.is_none()
             && main.film.min_samples() >= MIN_SAMPLES
@@ -78,7 +78,7 @@ impl Rendering {
     pub(super) fn is_done(&self) -> bool {
         let is_answer =
             |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
-        self.snapshot.as_ref().is_some_and(is_answer) && !self.inspector.is_busy()
+        self.snapshot.as_ref().is_some_and(is_answer) && !self.inspector.busy
     }
 
     /// Whether a GPU renders or is being made ready for it, where this device was chosen.

@@ -67,7 +67,7 @@ impl Recipe {
         settings: DevelopSettings,
         number: u64,
     ) -> Self {
-        let number = picture.is_live().then_some(number);
+        let number = picture.is_live.then_some(number);
         Self { picture: picture.clone(), overlay: overlay.cloned(), settings, number }
     }
 }

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::document::{Document, Light, Look, PictureSize, Viewpoint};
 use super::interface::{Dock, Interface, Tab};
-use crate::error::{Error, Result};
+use crate::error::{At as _, Result};
 use crate::image::{read_file, write_beside_and_rename};
 use crate::path::PathLimits;
 use crate::render::{StopRule, View};
@@ -113,7 +113,7 @@ impl Settings {
                         .map(Self::within_bounds)
                         .map_err(|e| format!("settings not understood: {e}"))
                 })
-                .map_err(|cause| Error::at(path, cause)),
+                .at(path),
         }
     }
 
@@ -174,7 +174,7 @@ impl Settings {
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
+            std::fs::create_dir_all(folder).at(folder)?;
         }
         let text = crate::output::record::to_json(self)?;
         write_beside_and_rename(path, |file| writeln!(file, "{text}"))

@@ -314,7 +314,7 @@ fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets, messages: &mut Messag
 
 /// Gives the document what belongs to the scene that is shown, after another could not be read.
 pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Library) {
-    let before = edited.undo.present().clone();
+    let before = edited.undo.present.clone();
     let document = &mut edited.document;
     let Some(scene) = &assets.scene else {
         // At the start there is none: the built-in one is always there.

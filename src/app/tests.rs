@@ -68,12 +68,12 @@ fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
     studio.asks(Command::Save(early.clone()));
     studio.asks(Command::Save(folder.path().join("another.png")));
     studio.asks(Command::KeepPicture);
-    assert!(studio.app.library.history.list_mut().is_empty(), "it is none of the document");
+    assert!(studio.app.library.history.list.is_empty(), "it is none of the document");
     studio.settle().expect("rendered");
     studio.frame().expect("drawn");
     studio.asks(Command::Save(late.clone()));
     studio.asks(Command::KeepPicture);
-    assert_eq!(studio.app.library.history.list_mut().len(), 1);
+    assert_eq!(studio.app.library.history.list.len(), 1);
     studio.frame().expect("drawn");
     assert!(studio.app.finish().is_empty());
     let pixels = |path: &Path| read_picture(path).expect("written").pixels;

@@ -7,7 +7,8 @@ const MAX_STEPS: usize = 200;
 #[derive(Debug, Clone)]
 pub(super) struct Undo<T> {
     past: Vec<T>,
-    present: T,
+    /// The state at rest.
+    pub(super) present: T,
     future: Vec<T>,
 }
 
@@ -51,11 +52,6 @@ impl<T: Clone + PartialEq> Undo<T> {
     pub(super) fn change_all(&mut self, mut change: impl FnMut(&mut T)) {
         self.past.iter_mut().chain(&mut self.future).for_each(&mut change);
         change(&mut self.present);
-    }
-
-    /// The state at rest.
-    pub(super) fn present(&self) -> &T {
-        &self.present
     }
 
     /// The state before, if any.
@@ -115,6 +111,6 @@ mod tests {
         assert!(!undo.can_undo() && !undo.can_redo());
         // It is none of what is at rest.
         undo.correct(&7, &8);
-        assert_eq!(*undo.present(), 2);
+        assert_eq!(undo.present, 2);
     }
 }

@@ -11,7 +11,7 @@ const MIN_ZOOM: f32 = 1.01;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zoom {
     /// Times as large, from 1.
-    times: f32,
+    pub(super) times: f32,
     /// Place of the picture in the middle of the room, both coordinates in `[0,1]`.
     middle: Vec2,
 }
@@ -30,11 +30,6 @@ impl Zoom {
         let margin = 0.5 / times;
         let middle = middle.clamp(Vec2::splat(margin), Vec2::splat(1.0 - margin));
         if times < MIN_ZOOM { Self::default() } else { Self { times, middle } }
-    }
-
-    /// Times as large as it fits, from 1.
-    pub(super) fn times(self) -> f32 {
-        self.times
     }
 
     /// Whether it is more than what fits.
@@ -83,7 +78,7 @@ mod tests {
             shown = zoom.of(area, whole, whole);
             assert!((place(shown) - before).length() < 1e-4, "{zoom:?}");
         }
-        assert!((zoom.times() - 4.5).abs() < 1e-4);
+        assert!((zoom.times - 4.5).abs() < 1e-4);
         // A part of it lies where it does.
         let part = Rect::from_center_size(whole.center(), 0.5 * whole.size());
         let of_part = zoom.of(area, whole, part);

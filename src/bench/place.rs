@@ -57,7 +57,7 @@ impl Place<'_> {
         view: View,
     ) -> Result<Session<'_>> {
         let Subject { world, environment, .. } = self.subject;
-        Session::on(world, environment, view, uploaded)
+        Session::on((world, environment), view, uploaded)
     }
 
     /// A view with the defaults of `lightgrid render`.

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::{interrupt, render, values};
 use crate::bench::{Options, Subject, run as measure};
 use crate::environment::{Environment, EnvironmentOptions};
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
@@ -38,20 +38,20 @@ pub(super) struct BenchArguments {
     #[arg(long, default_value = "sky:day", value_name = "MAP")]
     env: String,
     /// Devices; without it, the CPU and, if there is one, the best GPU.
-    #[arg(long, value_enum, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',')]
     device: Vec<Device>,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// What finds the surfaces that rays hit on a GPU.
-    #[arg(long, default_value = "auto", value_enum)]
+    #[arg(long, default_value = "auto")]
     rays: RayChoice,
     /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the GPU.
     /// The picture is the same. Where pixels share vertices, kernels always take turns.
-    #[arg(long, value_enum)]
+    #[arg(long)]
     schedule: Option<Schedule>,
     /// Whether pixels of a tile share what their paths find, as `render` does, or not, as the window does.
-    #[arg(long, default_value = "auto", value_enum, value_name = "off|4x4|8x8|auto")]
+    #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto")]
     sharing: Sharing,
     /// Picture size in pixels; without it, 1920x1080 with a real GPU, else 640x360.
     #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
@@ -99,8 +99,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     };
     let (map, notices) = crate::sources::map(&arguments.env)?;
     notices.iter().for_each(|sentence| progress.tell(&format!("notice: {sentence}")));
-    let environment = Environment::new(map, &EnvironmentOptions::default())
-        .map_err(|e| Error::at(&arguments.env, e))?;
+    let environment = Environment::new(map, &EnvironmentOptions::default()).at(&arguments.env)?;
     let subject = |name: &&str| {
         let world = World::new(crate::sources::scene_with(name, &arguments.of_scene.options())?);
         Ok(Subject { name: (*name).to_owned(), world, environment: environment.clone() })
@@ -116,7 +115,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         seconds: arguments.seconds,
     };
     interrupt.keep();
-    let bench = measure(&options, &subjects, interrupt.asked(), &|doing| progress.say(doing))?;
+    let bench = measure(&options, &subjects, &interrupt.asked, &|doing| progress.say(doing))?;
     progress.finish();
     if let Some(file) = &arguments.json {
         write_json(file, &crate::output::record::to_value(&bench)?)?;

@@ -28,7 +28,7 @@ pub(super) struct SceneArguments {
     variant: Option<String>,
     /// What happens to outlines: enlarged copies of a model that face inwards and, here, would shut out
     /// all light.
-    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT", help_heading = "Scene")]
+    #[arg(long, default_value = "remove", value_name = "WHAT", help_heading = "Scene")]
     outlines: Outlines,
     /// Units of the file's point, spot and directional lights: physical (candela, lux), watts (683 times
     /// weaker, as Blender shows them), or a factor. auto takes Blender's lux for watts.

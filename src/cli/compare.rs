@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::{Image, is_film, read_with_linearity};
 use crate::metrics::{Comparison, compare};
 use crate::output::film_file::read_film;
@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
             format!("is developed for a display and {linear} is linear: that is no comparison");
         return Err(Error::at(developed, cause));
     }
-    let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
+    let comparison = compare(&picture, &reference).at(&arguments.picture)?;
     if arguments.json {
         return print(crate::output::record::to_json(&comparison)?);
     }

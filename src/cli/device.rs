@@ -2,11 +2,9 @@
 
 use serde_json::json;
 
-use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
-use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, NO_GPU, RayChoice, Schedule, UploadedScene, adapters};
-use crate::render::{Session, View};
+use crate::render::Session;
+use crate::render::gpu::{DeviceChoice, Gpu, NO_GPU, RayChoice, adapters};
 use crate::terminal::{notice, print};
 
 /// Arguments of `devices`.
@@ -45,65 +43,50 @@ pub(super) fn say(notices: &mut Notices, sentence: String) {
     notices.add(sentence);
 }
 
-/// Connects to the GPU that is asked for; `None` is the CPU.
-pub(super) fn open(
-    choice: DeviceChoice,
-    adapter: Option<&str>,
-    (rays, schedule): (RayChoice, Option<Schedule>),
-    notices: &mut Notices,
-) -> Result<Option<Gpu>> {
-    let opened = match choice.open(adapter) {
-        Err(failure) if choice == DeviceChoice::Auto && adapter.is_none() => {
-            say(notices, format!("{failure}; the CPU renders"));
-            None
+/// Lets the CPU take over from a GPU that is not there, lacks memory or fails, unless that was asked for by name.
+pub(super) struct TakeOver<'a> {
+    pub(super) choice: DeviceChoice,
+    pub(super) notices: &'a mut Notices,
+}
+
+impl TakeOver<'_> {
+    /// Connects to the GPU that is asked for; `None` is the CPU.
+    pub(super) fn open(&mut self, adapter: Option<&str>, rays: RayChoice) -> Result<Option<Gpu>> {
+        let opened = self.choice.open(adapter);
+        let opened = if adapter.is_none() { self.renders_instead(opened)? } else { opened? };
+        match opened {
+            Some(gpu) => gpu.with_rays(rays).map(Some),
+            None if rays == RayChoice::Hardware => Err(Error::new(
+                "--rays hardware: the CPU has no ray queries; --device gpu takes a GPU",
+            )),
+            None => Ok(None),
         }
-        opened => opened?,
-    };
-    match opened {
-        Some(gpu) => gpu.with_rays(rays).map(|gpu| Some(gpu.with_schedule(schedule))),
-        None if rays == RayChoice::Hardware => {
-            Err(Error::new("--rays hardware: the CPU has no ray queries; --device gpu takes a GPU"))
-        }
-        None => Ok(None),
     }
-}
 
-/// Puts scene and map on the GPU, for any number of pictures; `None` if there is none or, with `auto`, if they
-/// do not fit.
-pub(super) fn upload(
-    choice: DeviceChoice,
-    gpu: Option<Gpu>,
-    (world, environment): (&World, &Environment),
-    notices: &mut Notices,
-) -> Result<Option<UploadedScene>> {
-    let uploaded = gpu.map(|gpu| UploadedScene::new(&gpu, world, environment)).transpose();
-    or_without(choice, uploaded, notices)
-}
-
-/// Starts the session on the GPU, or on the CPU if nothing is there or, with `auto`, if the picture does not fit.
-pub(super) fn start<'a>(
-    choice: DeviceChoice,
-    uploaded: Option<&UploadedScene>,
-    (world, environment): (&'a World, &'a Environment),
-    view: View,
-    notices: &mut Notices,
-) -> Result<Session<'a>> {
-    let on_gpu = uploaded.map(|on| Session::on(world, environment, view.clone(), Some(on)));
-    let session = or_without(choice, on_gpu.transpose(), notices)?;
-    Ok(session.unwrap_or_else(|| Session::new(world, environment, view)))
-}
-
-/// With `auto` the CPU renders what a GPU cannot.
-fn or_without<T>(
-    choice: DeviceChoice,
-    outcome: Result<Option<T>>,
-    notices: &mut Notices,
-) -> Result<Option<T>> {
-    match outcome {
-        Err(failure) if choice == DeviceChoice::Auto => {
-            say(notices, format!("{failure}; the CPU renders"));
-            Ok(None)
+    /// `None` if, with `auto`, the CPU has to render in place of this outcome.
+    pub(super) fn renders_instead<T>(&mut self, outcome: Result<Option<T>>) -> Result<Option<T>> {
+        match outcome {
+            Err(failure) if self.choice == DeviceChoice::Auto => {
+                say(self.notices, format!("{failure}; the CPU renders"));
+                Ok(None)
+            }
+            outcome => outcome,
         }
-        outcome => outcome,
+    }
+
+    /// `None` if, with `auto`, the CPU has to go on in place of this outcome.
+    pub(super) fn goes_on<T>(
+        &mut self,
+        session: &mut Session<'_>,
+        outcome: Result<T>,
+    ) -> Result<Option<T>> {
+        match outcome {
+            Err(failure) if self.choice == DeviceChoice::Auto => {
+                say(self.notices, format!("{failure}; the CPU goes on"));
+                session.continue_on_cpu();
+                Ok(None)
+            }
+            outcome => outcome.map(Some),
+        }
     }
 }

@@ -11,7 +11,8 @@ use crate::terminal::{leave_line, notice, tell};
 
 /// What signals set.
 pub(super) struct Interrupt {
-    asked: Arc<AtomicBool>,
+    /// Becomes true when the work is to end early. Others may set it, too.
+    pub(super) asked: Arc<AtomicBool>,
     /// Whether it was a signal that asked.
     signalled: Arc<AtomicBool>,
     has_work: Arc<AtomicBool>,
@@ -68,11 +69,6 @@ impl Interrupt {
     pub(super) fn has_frames_in(&self, folder: &Path) {
         let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         *frames = Some(folder.to_owned());
-    }
-
-    /// Becomes true when the work is to end early. Others may set it, too.
-    pub(super) fn asked(&self) -> &Arc<AtomicBool> {
-        &self.asked
     }
 
     /// Whether a signal asked.

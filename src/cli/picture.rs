@@ -16,25 +16,19 @@ use crate::tone::{KELVIN, TINT, ToneCurve, WhiteBalance};
 pub(super) struct PictureArguments {
     /// Exposure of .png pictures in stops, or `auto`.
     #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    exposure: Exposure,
+    pub(super) exposure: Exposure,
     /// Tone curve of .png pictures.
-    #[arg(long, default_value = "agx", value_enum, value_name = "CURVE", help_heading = "Picture")]
+    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
     /// What takes noise out of .png pictures and videos; unless it is given, the best there is.
-    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "best", help_heading = "Picture")]
+    #[arg(long, value_name = "FILTER", num_args = 0..=1, default_missing_value = "best", help_heading = "Picture")]
     denoise: Option<Denoise>,
     /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
     #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
     white: Option<WhiteBalance>,
     /// What RGB of .exr pictures holds: what was rendered, or linear radiance without noise, with a layer of what was
     /// rendered.
-    #[arg(
-        long,
-        default_value = "rendered",
-        value_enum,
-        value_name = "RGB",
-        help_heading = "Picture"
-    )]
+    #[arg(long, default_value = "rendered", value_name = "RGB", help_heading = "Picture")]
     rgb: LinearRgb,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, all of these, or
     /// denoised: linear radiance without noise.
@@ -114,12 +108,8 @@ impl PictureArguments {
     }
 
     /// Whether one of these pictures shows what was rendered as it is.
-    pub(super) fn shows_rendered<'a>(
-        &self,
-        pictures: impl IntoIterator<Item = &'a PathBuf>,
-    ) -> bool {
-        self.rgb == LinearRgb::Rendered
-            && pictures.into_iter().any(|path| output::holds_layers(path))
+    pub(super) fn shows_rendered(&self, pictures: &[PathBuf]) -> bool {
+        self.rgb == LinearRgb::Rendered && pictures.iter().any(|path| output::holds_layers(path))
     }
 
     /// Says what was asked for that none of these pictures holds, and which denoiser was found.
@@ -151,8 +141,8 @@ impl PictureArguments {
 
     /// Whether noise is to be taken out of one of these pictures or, if a filter was asked for, of those
     /// that are made of a part.
-    pub(super) fn is_denoised<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> bool {
-        pictures.into_iter().any(|path| match self.denoise {
+    pub(super) fn is_denoised(&self, pictures: &[PathBuf]) -> bool {
+        pictures.iter().any(|path| match self.denoise {
             Some(Denoise::Off) => false,
             _ if output::holds_layers(path) => self.denoises_linear(),
             Some(_) => true,
@@ -161,18 +151,12 @@ impl PictureArguments {
     }
 
     /// Whether albedo, normal and depth are wanted for these pictures.
-    pub(super) fn wants_surfaces<'a>(
-        &self,
-        pictures: impl IntoIterator<Item = &'a PathBuf>,
-    ) -> bool {
+    pub(super) fn wants_surfaces(&self, pictures: &[PathBuf]) -> bool {
         self.is_denoised(pictures) || self.asks_for_surface_layers()
     }
 
     /// Whether parts that lack albedo, normal and depth cannot make what was asked for.
-    pub(super) fn asks_for_surfaces<'a>(
-        &self,
-        pictures: impl IntoIterator<Item = &'a PathBuf>,
-    ) -> bool {
+    pub(super) fn asks_for_surfaces(&self, pictures: &[PathBuf]) -> bool {
         (self.asks_for_denoiser() && self.is_denoised(pictures)) || self.asks_for_surface_layers()
     }
 
@@ -183,25 +167,11 @@ impl PictureArguments {
 
     /// Takes the exposure of a film's picture, to be that of others, too; where noise cannot be taken out, there
     /// is no picture that has one, as there is none where all hold what was rendered.
-    pub(super) fn take_exposure<'a>(
-        &mut self,
-        film: &Film,
-        pictures: impl IntoIterator<Item = &'a PathBuf>,
-    ) {
-        if pictures.into_iter().all(|path| output::holds_layers(path)) {
-            return;
+    pub(super) fn take_exposure(&mut self, film: &Film, pictures: &[PathBuf]) {
+        if !pictures.iter().all(|path| output::holds_layers(path)) {
+            let found = output::exposure_of(&self.options(film), film);
+            self.exposure = found.unwrap_or(self.exposure);
         }
-        self.exposure = output::exposure_of(&self.options(film), film).unwrap_or(self.exposure);
-    }
-
-    /// The exposure of its pictures.
-    pub(super) fn exposure(&self) -> Exposure {
-        self.exposure
-    }
-
-    /// Takes this exposure.
-    pub(super) fn set_exposure(&mut self, exposure: Exposure) {
-        self.exposure = exposure;
     }
 
     /// Without layers a film is denoised only if that was asked for, which then fails with a sentence.
@@ -217,12 +187,8 @@ impl PictureArguments {
     }
 
     /// The picture without noise, where several of these pictures show it: it is filtered once.
-    pub(super) fn denoised<'a>(
-        &self,
-        pictures: impl IntoIterator<Item = &'a PathBuf>,
-        films: Films<'_>,
-    ) -> Option<Image> {
-        let showing = pictures.into_iter().filter(|path| self.is_denoised([*path])).count();
+    pub(super) fn denoised(&self, pictures: &[PathBuf], films: Films<'_>) -> Option<Image> {
+        let showing = pictures.chunks(1).filter(|picture| self.is_denoised(picture)).count();
         let filter = self.options(films.film).denoiser.filter(|_| showing > 1)?;
         // Where it fails, each picture that is not written says why.
         filter.finish(films.film, films.cached).ok()

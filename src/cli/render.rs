@@ -14,13 +14,13 @@ use std::time::Instant;
 
 use glam::Vec2;
 
-use super::device;
+use super::device::TakeOver;
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::environment::sun::Sun;
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::exr_encoder_bytes;
 use crate::light_grid::LearningGrid;
 use crate::memory;
@@ -28,7 +28,7 @@ use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, UploadedScene};
+use crate::render::gpu::UploadedScene;
 use crate::render::sun_placement::SunPlacement;
 use crate::render::{Driver, Figures, Session, View, cut_off_notice};
 use crate::scene::Camera;
@@ -82,20 +82,18 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         }
     };
     arguments.check_fog(&world.scene, &mut notices);
-    let cut_off = cut_off_notice(&world, &environment, &arguments.view(&world, camera.clone()));
+    let cut_off = cut_off_notice((&world, &environment), &arguments.view(&world, camera.clone()));
     cut_off.into_iter().for_each(|sentence| notices.add(sentence));
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
     memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;
     progress.finish();
     notices.iter().for_each(notice);
-    let gpu = device::open(
-        arguments.device,
-        arguments.adapter.as_deref(),
-        (arguments.rays, arguments.schedule),
-        &mut notices,
-    )?;
-    let uploaded = device::upload(arguments.device, gpu, (&world, &environment), &mut notices)?;
+    let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
+    let gpu = cpu.open(arguments.adapter.as_deref(), arguments.rays)?;
+    let gpu = gpu.map(|gpu| gpu.with_schedule(arguments.schedule));
+    let on_gpu = gpu.map(|gpu| UploadedScene::new(&gpu, &world, &environment));
+    let uploaded = cpu.renders_instead(on_gpu.transpose())?;
     let job =
         Job { world: &world, environment: &environment, phases, notices, uploaded, interrupt };
     match frames {
@@ -112,9 +110,8 @@ fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     let [width, height] = arguments.size();
     let has_layers = arguments.wants_surfaces();
     let [film, mut writing] = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    if has_layers
-        && (arguments.part.is_some() || arguments.picture.is_denoised(arguments.pictures()))
-    {
+    let is_denoised = arguments.picture.is_denoised(&arguments.pictures());
+    if has_layers && (arguments.part.is_some() || is_denoised) {
         writing = BYTES_OF_COPY;
     }
     if arguments.seconds.is_some() {
@@ -164,19 +161,19 @@ impl Job<'_> {
         let spare: Vec<u8> =
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
-        let rule = arguments.stop_rule();
-        let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
+        let mut assignment = RenderJob::open(arguments, (world, environment), &view)?;
         assignment.say(&mut notices);
-        let uploaded = self.uploaded.as_ref();
         let film_bytes = needed_bytes(arguments)[0];
-        let mut beside = Beside::new(arguments, world, environment, &view, film_bytes);
-        let session =
-            device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
+        let mut beside = Beside::new(arguments, (world, environment), &view, film_bytes);
+        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
+        let start = |on| Session::on((world, environment), view.clone(), Some(on));
+        let on_gpu = cpu.renders_instead(self.uploaded.as_ref().map(start).transpose())?;
+        let session = on_gpu.unwrap_or_else(|| Session::new(world, environment, view));
         let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), &notices);
         assignment.set_metadata(record.metadata());
-        let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
+        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
         let begun = counted.map_or(Ok(()), |counted| {
             let taken_up = driver.session.continue_learning(counted);
@@ -206,7 +203,7 @@ impl Job<'_> {
         let (asked, mut arguments) = (arguments, Cow::Borrowed(arguments));
         if known.is_some() {
             // What the first frame has is what all have.
-            arguments.to_mut().picture.take_exposure(&film, asked.pictures());
+            arguments.to_mut().picture.take_exposure(&film, &asked.pictures());
         }
         let figures = driver.session.figures();
         let done = (&*film, &figures, beside.seconds);
@@ -221,7 +218,7 @@ impl Job<'_> {
             return Error::all(failures).map(|()| Vec::new());
         }
         if let Some(known) = known {
-            known.exposure = Some(arguments.picture.exposure());
+            known.exposure = Some(arguments.picture.exposure);
             known.counted = driver.session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
@@ -263,7 +260,7 @@ impl Job<'_> {
         let (videos, pictures): (Vec<_>, Vec<_>) =
             arguments.outputs.iter().partition(|path| frames::is_video(path));
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
-        reel.iter().for_each(|reel| self.interrupt.has_frames_in(reel.folder()));
+        reel.iter().for_each(|reel| self.interrupt.has_frames_in(&reel.folder));
         let mut failures = Vec::new();
         let mut known = Known::default();
         let mut progress = Progress::start("");
@@ -284,7 +281,7 @@ impl Job<'_> {
                     break;
                 }
             }
-            known.exposure.take().into_iter().for_each(|ev| of_frame.picture.set_exposure(ev));
+            of_frame.picture.exposure = known.exposure.take().unwrap_or(of_frame.picture.exposure);
             if self.interrupt.was_signalled() {
                 notice(format_args!("frame {number} was ended early and is the last"));
                 break;
@@ -340,8 +337,7 @@ fn load_environment(arguments: &RenderArguments) -> Result<(Environment, Notices
     let (map, notices) = crate::sources::map(arguments.map())?;
     let load_seconds = lap(start);
     let start = Instant::now();
-    let environment = Environment::new(map, &arguments.environment_options())
-        .map_err(|e| Error::at(arguments.map(), e))?;
+    let environment = Environment::new(map, &arguments.environment_options()).at(arguments.map())?;
     Ok((environment, notices, load_seconds, lap(start)))
 }
 
@@ -372,26 +368,6 @@ pub(super) fn start_threads(threads: u16) -> Result<()> {
         .map_err(|e| cannot(&e))
 }
 
-/// Lets the CPU take over from a GPU that fails, unless that was asked for by name.
-struct TakeOver<'a> {
-    device: DeviceChoice,
-    notices: &'a mut Notices,
-}
-
-impl TakeOver<'_> {
-    /// `None` if the CPU has to go on in place of this outcome.
-    fn goes_on<T>(&mut self, session: &mut Session<'_>, outcome: Result<T>) -> Result<Option<T>> {
-        match outcome {
-            Err(failure) if self.device == DeviceChoice::Auto => {
-                device::say(self.notices, format!("{failure}; the CPU goes on"));
-                session.continue_on_cpu();
-                Ok(None)
-            }
-            outcome => outcome.map(Some),
-        }
-    }
-}
-
 /// Runs the session until a rule or the user says stop. When the seconds are over, the pass under way ends
 /// with what it has.
 fn work<'a>(
@@ -401,10 +377,10 @@ fn work<'a>(
     progress: &Progress,
     cpu: &mut TakeOver<'_>,
 ) -> Result<()> {
-    let alarm = Alarm::start(Arc::clone(interrupt.asked()));
+    let alarm = Alarm::start(Arc::clone(&interrupt.asked));
     loop {
         progress.show(&driver.session, &driver.rule, (beside.counted(), beside.seconds));
-        if beside.advance(driver, interrupt.asked())? {
+        if beside.advance(driver, &interrupt.asked)? {
             continue;
         }
         let step = assignment.step(driver, interrupt, &alarm, cpu.notices);

@@ -46,19 +46,13 @@ struct FreeArguments {
     #[command(flatten)]
     places: PlaceArguments,
     /// How the map is sampled; the first one is what the others are held against.
-    #[arg(
-        long,
-        value_enum,
-        value_delimiter = ',',
-        default_value = "plain,talk,adaptive",
-        value_name = "LIST"
-    )]
+    #[arg(long, value_delimiter = ',', default_value = "plain,talk,adaptive", value_name = "LIST")]
     sampling: Vec<Sampling>,
     /// Whether paths are followed to their end, end in the radiance cache, or are measured both ways.
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "exact", value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', default_value = "exact", value_name = "LIST")]
     gi: Vec<Gi>,
     /// Whether pixels of a tile share what their paths find, as `render` does, or not, as the window does.
-    #[arg(long, default_value = "auto", value_enum, value_name = "off|4x4|8x8|auto")]
+    #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto")]
     sharing: Sharing,
     /// A picture to take as the reference, linear, of the size of the runs (box filter, as many
     /// bounces); without it one is computed and kept.
@@ -95,7 +89,7 @@ struct EffortArguments {
     #[arg(short, long, value_name = "DIR", required = true)]
     output: Option<PathBuf>,
     /// Where to measure: cpu, gpu (be it a software one), or both.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
     device: Vec<Device>,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
@@ -259,7 +253,7 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
             folder: &folder,
             references: arguments.references.as_deref(),
             adapter: arguments.adapter.as_deref(),
-            cancel: cancel.asked(),
+            cancel: &cancel.asked,
             progress: &|what| progress.say(what),
             tell: &|what| progress.tell(&what),
         },
@@ -308,7 +302,7 @@ fn tables(arguments: &SatArguments) -> Result<()> {
         arguments.output.as_deref(),
         |case| {
             progress.say(format!("{}, {}x{}", case.title, case.size.0, case.size.1));
-            is_set(cancel.asked())
+            is_set(&cancel.asked)
         },
         |measured| progress.tell(&format!("{}: {}", measured.title, measured.report)),
     );

@@ -2,7 +2,7 @@
 
 use crate::environment::sun::Sun;
 use crate::environment::{TALKS_MAPS, TIMED_SAMPLES, sat_report};
-use crate::error::{Error, Result};
+use crate::error::{At as _, Result};
 use crate::terminal::{notice, one_line, print};
 
 /// Arguments of `sat`.
@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
         if Sun::of(&map).is_none() {
             notice(format_args!("{name}: the map is black, so there is nothing to be sampled"));
         }
-        let report = sat_report(&map, TIMED_SAMPLES).map_err(|e| Error::at(name, e))?;
+        let report = sat_report(&map, TIMED_SAMPLES).at(name)?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {

@@ -62,10 +62,10 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto")]
     exposure: Exposure,
     /// What is drawn over the picture.
-    #[arg(long, value_enum, value_name = "NAME")]
+    #[arg(long, value_name = "NAME")]
     overlay: Option<Overlay>,
     /// What else is open; may be given several times.
-    #[arg(long, value_enum, value_name = "NAME")]
+    #[arg(long, value_name = "NAME")]
     panel: Vec<PanelName>,
     /// Samples per pixel.
     #[arg(long, visible_alias = "spp", default_value = "16", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N")]
@@ -77,10 +77,10 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, default_value = "1", value_parser = scale, allow_hyphen_values = true, value_name = "FACTOR")]
     scale: f32,
     /// How the map is sampled.
-    #[arg(long, default_value = "adaptive", value_enum)]
+    #[arg(long, default_value = "adaptive")]
     sampling: Sampling,
     /// Where to render the picture; the window itself is always drawn by a graphics device.
-    #[arg(long, default_value = "cpu", value_enum)]
+    #[arg(long, default_value = "cpu")]
     device: DeviceChoice,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
@@ -101,7 +101,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_parser = values::whole::<u32>(0..=u32::MAX), value_name = "N")]
     tile: Option<u32>,
     /// What the map of tiles shows.
-    #[arg(long, value_enum, value_name = "WHAT")]
+    #[arg(long, value_name = "WHAT")]
     tiles: Option<TileView>,
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG")]

@@ -17,7 +17,7 @@ use crate::terminal::print;
 #[derive(Debug, clap::Args)]
 pub(super) struct StabilityArguments {
     /// What renders: on the CPU all cases but those about a GPU, on a GPU the cases that render.
-    #[arg(long, default_value = "cpu", value_enum)]
+    #[arg(long, default_value = "cpu")]
     device: Device,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]

@@ -37,16 +37,16 @@ pub(super) struct ViewArguments {
     #[command(flatten)]
     place: CameraArguments,
     /// How the map is sampled.
-    #[arg(long, value_enum)]
+    #[arg(long)]
     sampling: Option<Sampling>,
     /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
-    #[arg(long, value_enum)]
+    #[arg(long)]
     device: Option<DeviceChoice>,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// What finds the surfaces that rays hit on a GPU.
-    #[arg(long, default_value = "auto", value_enum)]
+    #[arg(long, default_value = "auto")]
     rays: RayChoice,
     /// Picture size in pixels; without it, that of the viewport.
     #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]

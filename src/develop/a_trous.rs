@@ -3,7 +3,7 @@
 use super::{dispatch, entry, filled, pipeline};
 use crate::denoise::a_trous::STEPS;
 use crate::denoise::{a_trous, edges, guides, light};
-use crate::render::gpu::{DeviceFilm, Gpu, constants};
+use crate::render::gpu::{DeviceFilm, Gpu, buffer, constants};
 
 constants::constants! {
     ALBEDO_TOLERANCE: guides::ALBEDO_TOLERANCE,
@@ -86,15 +86,10 @@ impl Passes {
             ("light", LIGHT_BYTES),
             ("counts", LIGHT_BYTES),
         ];
+        let pixels = u64::from(film.width) * u64::from(film.height);
+        let usage = wgpu::BufferUsages::STORAGE;
         let made = gpu.make(|device| {
-            planes.map(|(label, bytes)| {
-                device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some(label),
-                    size: u64::from(film.width) * u64::from(film.height) * bytes,
-                    usage: wgpu::BufferUsages::STORAGE,
-                    mapped_at_creation: false,
-                })
-            })
+            planes.map(|(label, bytes)| buffer(device, Some(label), pixels * bytes, usage))
         });
         let [guides, mut light, mut result, counts] = made.ok()?;
         let settings = |step: u32| {

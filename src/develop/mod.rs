@@ -15,7 +15,7 @@ use glam::Mat3;
 
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
-use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::gpu::{DeviceFilm, Gpu, buffer};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
 
 /// Pixels across of the picture that the exposure is taken from: so coarse that noise averages out.
@@ -27,7 +27,8 @@ const TILE: u32 = 8;
 #[derive(Clone, PartialEq)]
 pub(crate) struct LinearPicture {
     film: DeviceFilm,
-    is_live: bool,
+    /// Whether it may change by itself.
+    pub(crate) is_live: bool,
 }
 
 impl LinearPicture {
@@ -39,11 +40,6 @@ impl LinearPicture {
     /// Sums that nobody will change.
     fn fixed(film: DeviceFilm) -> Self {
         Self { film, is_live: false }
-    }
-
-    /// Whether it may change by itself.
-    pub(crate) fn is_live(&self) -> bool {
-        self.is_live
     }
 
     /// Its sums.
@@ -206,12 +202,8 @@ impl Developer {
         };
         let settings = self.buffer(bytemuck::bytes_of(&settings));
         let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
-        let small = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("small picture"),
-            size: bytes,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let small = buffer(&self.gpu.device, Some("small picture"), bytes, usage);
         let entries = [self.inputs(picture, &settings).as_slice(), &[entry(6, &small)]].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.shrink, &entries, [width, height]);
@@ -282,12 +274,8 @@ impl Developer {
 
 /// A buffer of these bytes. It is written by the queue, for mapping panics where the device is lost.
 fn filled(gpu: &Gpu, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: bytes.len() as u64,
-        usage: usage | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+    let usage = usage | wgpu::BufferUsages::COPY_DST;
+    let buffer = buffer(&gpu.device, None, bytes.len() as u64, usage);
     gpu.queue.write_buffer(&buffer, 0, bytes);
     buffer
 }

@@ -18,10 +18,10 @@ use rayon::prelude::*;
 use super::exr_channels::{Channels, select};
 use super::exr_patch::patch;
 use super::file::{open_file, read_cause, read_file};
-use super::guard::catch_panic;
+use super::guard::guarded;
 use super::primaries::{Primaries, REC709, rec709_conversion};
 use super::{Image, Rgb8, check_size};
-use crate::error::{Decoded, Error, Notices, Result};
+use crate::error::{At as _, Decoded, Error, Notices, Result};
 use crate::memory;
 
 /// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.
@@ -40,7 +40,7 @@ pub(crate) struct Exr {
 /// One sentence: missing, damaged, too large, or of a kind that is not read (deep, an unknown
 /// compression).
 pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
-    let (file, file_bytes) = open_file(path).map_err(|cause| Error::at(path, cause))?;
+    let (file, file_bytes) = open_file(path).at(path)?;
     let decoded =
         || match ChunkReader::read_from_buffered(BufReader::with_capacity(1 << 20, file), false) {
             Ok(reader) => decode(reader, file_bytes, None),
@@ -52,9 +52,7 @@ pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
             }
             Err(failure) => Err(decode_cause(&failure)),
         };
-    catch_panic(decoded)
-        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
-        .map_err(|cause| Error::at(path, cause))
+    guarded(decoded).at(path)
 }
 
 /// Whether a header is refused that [`patch`] cures.
@@ -103,10 +101,9 @@ pub fn read_exr_preview(path: &Path) -> Result<Option<Rgb8>> {
 
 /// What the first part of a file says beside what its pixels need.
 fn own_attributes(path: &Path) -> Result<LayerAttributes> {
-    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
-    let meta = catch_panic(|| MetaData::read_from_buffered(BufReader::new(file), false))
-        .ok_or_else(|| Error::at(path, "is damaged: its decoder failed"))?
-        .map_err(|e| Error::at(path, decode_cause(&e)))?;
+    let (file, _) = open_file(path).at(path)?;
+    let read = || MetaData::read_from_buffered(BufReader::new(file), false);
+    let meta = guarded(|| read().map_err(|e| decode_cause(&e))).at(path)?;
     let mut headers = meta.headers.into_iter();
     let first = headers.next().ok_or_else(|| Error::at(path, "has no pictures"))?;
     Ok(first.own_attributes)
@@ -347,7 +344,7 @@ struct BlockDecoder {
 
 impl BlockDecoder {
     fn decode(&self, chunk: Chunk, meta: &MetaData) -> Decoded<Block> {
-        catch_panic(|| {
+        guarded(|| {
             if let Some(sampling) = &self.sampling {
                 return self.decode_subsampled(chunk, meta, sampling);
             }
@@ -366,7 +363,6 @@ impl BlockDecoder {
             self.convert(&mut pixels);
             Ok(Block { x, y, width, pixels })
         })
-        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
     }
 
     /// Pixels as they are stored, NaN where there is no sample: lines hold only the channels that have some

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use crate::error::{Decoded, Error, Result};
+use crate::error::{At as _, Decoded, Error, Result};
 use crate::memory;
 use crate::system::FileName;
 
@@ -156,7 +156,7 @@ fn checked_target(path: &Path) -> Result<PathBuf> {
         return Err(Error::at(path, cause.to_owned()));
     }
     let target = followed(path);
-    check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    check_target(&target).at(path)?;
     Ok(target)
 }
 

@@ -4,6 +4,8 @@ use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
+use crate::error::Decoded;
+
 /// Most bytes that decoding a picture file of `file_bytes` may take: what deflate, the densest of the
 /// codecs in use on real pictures, could make of it (1032 to 1), and some room for tables.
 pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
@@ -33,6 +35,11 @@ pub(crate) fn catch_panic<T>(decode: impl FnOnce() -> T) -> Option<T> {
     let result = panic::catch_unwind(AssertUnwindSafe(decode)).ok();
     QUIET.set(outer);
     result
+}
+
+/// What a decoder of others returns, or a sentence if it panics.
+pub(super) fn guarded<T>(decode: impl FnOnce() -> Decoded<T>) -> Decoded<T> {
+    catch_panic(decode).unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
 }
 
 #[cfg(test)]

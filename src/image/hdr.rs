@@ -21,7 +21,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
     let header = Header::parse(&mut cursor, &mut notices)?;
     let (major, minor) = (header.major, header.minor);
     // A row takes four bytes at the very least.
-    if (cursor.rest.len() as u64) < 4 * u64::from(major.count) {
+    if (cursor.rest.len() as u64) < 4 * major.count {
         return Err(format!(
             "is cut short: {} bytes cannot hold {} x {} pixels",
             cursor.rest.len(),
@@ -60,13 +60,13 @@ const MAX_PIXELS_PER_BYTE: usize = 16;
 #[derive(Debug, Clone, Copy)]
 struct Axis {
     is_y: bool,
-    count: u32,
+    count: u64,
     /// Whether pixels come in the opposite order of ours (left to right, top to bottom).
     reversed: bool,
 }
 
 impl Axis {
-    fn parse(sign_and_name: &str, count: &str) -> Option<(bool, bool, u64)> {
+    fn parse(sign_and_name: &str, count: &str) -> Option<Self> {
         let (is_y, reversed) = match sign_and_name {
             "-Y" => (true, false),
             "+Y" => (true, true),
@@ -74,10 +74,10 @@ impl Axis {
             "-X" => (false, true),
             _ => return None,
         };
-        Some((is_y, reversed, count.parse().ok()?))
+        Some(Self { is_y, reversed, count: count.parse().ok()? })
     }
 
-    fn position(self, index: u32) -> usize {
+    fn position(self, index: u64) -> usize {
         (if self.reversed { self.count - 1 - index } else { index }) as usize
     }
 }
@@ -162,11 +162,11 @@ impl Header {
     }
 
     fn width(&self) -> u32 {
-        if self.major.is_y { self.minor.count } else { self.major.count }
+        (if self.major.is_y { self.minor.count } else { self.major.count }) as u32
     }
 
     fn height(&self) -> u32 {
-        if self.major.is_y { self.major.count } else { self.minor.count }
+        (if self.major.is_y { self.major.count } else { self.minor.count }) as u32
     }
 }
 
@@ -191,22 +191,13 @@ fn parse_resolution(line: &str) -> Decoded<(Axis, Axis)> {
         [a, n, b, m] => Axis::parse(a, n).zip(Axis::parse(b, m)),
         _ => None,
     };
-    let Some(((major_is_y, major_reversed, n), (minor_is_y, minor_reversed, m))) =
-        axes.filter(|(major, minor)| major.0 != minor.0)
-    else {
+    let Some((major, minor)) = axes.filter(|(major, minor)| major.is_y != minor.is_y) else {
         let start: String = line.chars().take(40).collect();
         return Err(format!("has no resolution like '-Y 512 +X 1024' but '{start}'"));
     };
-    let (n, m) = if major_is_y {
-        let (width, height) = check_size(m, n)?;
-        (height, width)
-    } else {
-        check_size(n, m)?
-    };
-    Ok((
-        Axis { is_y: major_is_y, count: n, reversed: major_reversed },
-        Axis { is_y: minor_is_y, count: m, reversed: minor_reversed },
-    ))
+    let (columns, rows) = if major.is_y { (minor, major) } else { (major, minor) };
+    check_size(columns.count, rows.count)?;
+    Ok((major, minor))
 }
 
 /// Four bytes to linear RGB.

@@ -4,9 +4,9 @@ use std::io::Cursor;
 
 use image::ImageDecoder;
 
-use super::guard::{catch_panic, decoder_bytes};
+use super::guard::{decoder_bytes, guarded};
 use super::{Texels, ktx2, tiff};
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::memory;
 
 /// Widest and highest picture that is decoded.
@@ -59,12 +59,11 @@ impl LdrHeader {
     /// When the format is not recognised or the header is damaged; the sentence begins with `name`.
     pub fn of(bytes: &[u8], name: &str) -> Result<Self> {
         if ktx2::is_ktx2(bytes) {
-            let (width, height) = ktx2::size(bytes).map_err(|cause| Error::at(name, cause))?;
+            let (width, height) = ktx2::size(bytes).at(name)?;
             return Ok(Self { width, height, bytes_per_pixel: 4 });
         }
-        tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
-        let decoder = reader(bytes, name)?.into_decoder();
-        let decoder = decoder.map_err(|cause| Error::at(name, cause))?;
+        tiff::check(bytes).at(name)?;
+        let decoder = reader(bytes, name)?.into_decoder().at(name)?;
         let (width, height) = decoder.dimensions();
         Ok(Self { width, height, bytes_per_pixel: decoder.color_type().bytes_per_pixel() })
     }
@@ -94,12 +93,11 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
         return Err(Error::at(name, cause));
     }
     if ktx2::is_ktx2(bytes) {
-        let (pixels, is_premultiplied) =
-            ktx2::decode(bytes).map_err(|cause| Error::at(name, cause))?;
+        let (pixels, is_premultiplied) = ktx2::decode(bytes).at(name)?;
         let pixels = Texels::from(pixels).without_opaque_alpha();
         return Ok(LdrImage { width, height, pixels, is_premultiplied });
     }
-    memory::check(header.decoding_bytes()).map_err(|cause| Error::at(name, cause))?;
+    memory::check(header.decoding_bytes()).at(name)?;
     let mut reader = reader(bytes, name)?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
@@ -107,9 +105,8 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     let file_bytes = bytes.len() as u64;
     limits.max_alloc = Some(MAX_BYTES.min(decoder_bytes(file_bytes)));
     reader.limits(limits);
-    let decoded = catch_panic(|| reader.decode())
-        .ok_or_else(|| Error::at(name, "is damaged: its decoder failed"))?;
-    let decoded = decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?;
+    let cause = |cause| decoder_cause(&cause, file_bytes);
+    let decoded = guarded(|| reader.decode().map_err(cause)).at(name)?;
     let (width, height) = (decoded.width(), decoded.height());
     let color = decoded.color();
     let channels = color.channel_count();
@@ -128,9 +125,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
 }
 
 fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&'a [u8]>>> {
-    let reader = image::ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|cause| Error::at(name, cause))?;
+    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().at(name)?;
     if reader.format().is_none() {
         return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP, KTX 2)"));
     }

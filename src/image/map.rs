@@ -9,12 +9,12 @@ use rayon::prelude::*;
 
 use super::exr_read::{Exr, read_exr};
 use super::file::{extension, open_file, read_cause, read_file};
-use super::guard::{catch_panic, decoder_bytes};
+use super::guard::{decoder_bytes, guarded};
 use super::hdr::decode_hdr;
 use super::ldr::decoder_cause;
 use super::{Image, MAX_PIXELS, MAX_SIDE, check_size, tiff};
 use crate::color::linear_from_srgb;
-use crate::error::{Decoded, Error, Notices, Result};
+use crate::error::{At as _, Decoded, Error, Notices, Result};
 use crate::memory;
 
 /// An environment map: finite, non-negative radiance, and what had to be done to get it.
@@ -195,7 +195,7 @@ enum Format {
 fn format_of(path: &Path) -> Result<Format> {
     /// No format takes more bytes to be told.
     const START: u64 = 16;
-    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
+    let (file, _) = open_file(path).at(path)?;
     let mut start = Vec::new();
     file.take(START).read_to_end(&mut start).map_err(|e| Error::at(path, read_cause(&e)))?;
     if is_film(path) {
@@ -220,16 +220,13 @@ fn format_of(path: &Path) -> Result<Format> {
 }
 
 fn read_hdr(path: &Path) -> Result<LoadedMap> {
-    let decoded = read_file(path).and_then(|bytes| decode_hdr(&bytes));
-    let (image, notices) = decoded.map_err(|cause| Error::at(path, cause))?;
+    let (image, notices) = read_file(path).and_then(|bytes| decode_hdr(&bytes)).at(path)?;
     Ok(LoadedMap { image, notices })
 }
 
 /// Reads an sRGB-encoded picture, or a float TIFF as it is; whether it is the latter.
 fn read_ldr_map(path: &Path) -> Result<(LoadedMap, bool)> {
-    let decoded = catch_panic(|| decode_ldr_file(path))
-        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
-        .map_err(|cause| Error::at(path, cause))?;
+    let decoded = guarded(|| decode_ldr_file(path)).at(path)?;
     let mut notices = Notices::default();
     let (width, height) = (decoded.width(), decoded.height());
     let bits = match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {

@@ -34,9 +34,11 @@ pub struct LightGrid {
     distributions: TileDistributions,
     cells: Option<Cells>,
     /// Share of samples, in 256ths, that follow the whole map's distribution.
-    whole_map_share: u32,
-    /// Number of times that distributions were built from counters; see [`Self::generation`].
-    generation: u32,
+    pub(crate) whole_map_share: u32,
+    /// Generation of the distributions: 0 without learning, and increasing by one each time they are rebuilt. The
+    /// samples that they were built from followed distributions of lower generations: see
+    /// [`crate::sampler::Sequence`].
+    pub(crate) generation: u32,
 }
 
 #[derive(Debug, Clone)]
@@ -104,18 +106,6 @@ impl LightGrid {
     /// The distributions over the map's tiles; distribution 0 is [`WHOLE_MAP`]. [`Self::sample`] mixes them.
     pub fn distributions(&self) -> &TileDistributions {
         &self.distributions
-    }
-
-    /// Generation of the distributions: 0 without learning, and increasing by one each time they are rebuilt. The
-    /// samples that they were built from followed distributions of lower generations: see
-    /// [`crate::sampler::Sequence`].
-    pub(crate) fn generation(&self) -> u32 {
-        self.generation
-    }
-
-    /// Share of samples, in 256ths, that follow the whole map's distribution.
-    pub(crate) fn whole_map_share(&self) -> u32 {
-        self.whole_map_share
     }
 
     /// The grid, unless every point uses the whole map.
@@ -199,7 +189,7 @@ mod tests {
         let energies: Vec<f64> = (0..200).map(|tile| f64::from(tile % 7 * tile)).collect();
         let grid =
             LightGrid::with_garbage_distributions(GRID, &energies, 3).expect("a map with light");
-        assert!(grid.whole_map_share() > 0);
+        assert!(grid.whole_map_share > 0);
         const COUNT: u32 = 200_000;
         for distribution in [WHOLE_MAP, 1, 2, 3] {
             let mut found = vec![0.0; energies.len()];
@@ -245,7 +235,7 @@ mod tests {
             LightGrid::with_garbage_distributions(GRID, &[1.0; 64], 5).expect("a map with light");
         let unreachable = |tile: &u32| grid.distributions().probability(1, *tile) == 0.0;
         let tile = (0..64).find(unreachable).expect("garbage has gaps");
-        let share = grid.whole_map_share() as f32 / 256.0;
+        let share = grid.whole_map_share as f32 / 256.0;
         assert!((grid.probability(1, tile) * 64.0 / share - 1.0).abs() < 1e-5);
     }
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::error::{Decoded, Error, Result};
+use crate::error::{At as _, Decoded, Error, Result};
 use crate::image::{looks_like_film, open_file, read_cause, read_file, write_beside_and_rename};
 use crate::memory;
 use crate::render::film::{Film, Pixel, Surface};
@@ -123,7 +123,7 @@ pub fn write_film(path: &Path, facts: &FilmFacts, film: &Film, skipped: u32) -> 
         layers: film.has_layers(),
         facts: facts.clone(),
     };
-    let line = serde_json::to_string(&header).map_err(|e| Error::at(path, e))?;
+    let line = serde_json::to_string(&header).at(path)?;
     let width = film.width as usize;
     write_beside_and_rename(path, |file| {
         writeln!(file, "{line}")?;
@@ -155,7 +155,7 @@ fn pixel_words(pixel: &Pixel, skipped: u32) -> [u64; PIXEL_WORDS] {
 /// One sentence: the file cannot be read, is something else, or is not whole.
 pub fn read_film(path: &Path) -> Result<(FilmFacts, Film)> {
     let decoded = read_file(path).and_then(|bytes| decode(&bytes));
-    decoded.map_err(|cause| Error::at(path, cause))
+    decoded.at(path)
 }
 
 /// Reads what a film in a file is of, without the film.

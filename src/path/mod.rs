@@ -41,7 +41,7 @@ pub use limits::PathLimits;
 pub(crate) use limits::{CutOff, MAX_INTERFACES, MIN_SURVIVAL, ROULETTE_AFTER, ROULETTE_MILDNESS};
 pub use looks::FirstHit;
 pub(crate) use train::TRAINING_VERTICES;
-pub use world::World;
+pub use world::{Lit, World};
 pub use world_builder::WorldBuilder;
 
 use self::body::Body;

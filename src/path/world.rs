@@ -16,6 +16,9 @@ use crate::scene::needs::{SceneFeatures, SceneNeeds};
 use crate::scene::surface::{SurfacePoint, alpha_at};
 use crate::scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, TextureImage};
 
+/// A scene and the map that lights it.
+pub type Lit<'a> = (&'a World, &'a Environment);
+
 /// Everything about the scene that paths ask for.
 pub struct World {
     /// The scene.
@@ -28,7 +31,7 @@ pub struct World {
     pub lights: LocalLights,
     materials: Vec<ReadyMaterial>,
     /// The same one in all worlds of the same geometry.
-    geometry: Arc<()>,
+    pub(crate) geometry: Arc<()>,
     clock: Option<RayClock>,
 }
 
@@ -70,11 +73,6 @@ impl World {
         let materials = self.scene.materials.iter().zip(&other.scene.materials);
         Arc::ptr_eq(&self.geometry, &other.geometry)
             && materials.into_iter().all(|(a, b)| a.lets_pass_like(b))
-    }
-
-    /// The identity of its geometry, whatever its surfaces are made of.
-    pub(crate) fn geometry(&self) -> &Arc<()> {
-        &self.geometry
     }
 
     /// About what it holds: geometry, textures and tree.

@@ -9,9 +9,8 @@ use super::block_errors::{BlockErrors, block_errors};
 use super::film::Film;
 use super::view::{Gi, View};
 use super::view_probe::{ROOM_ENCLOSURE, enclosure};
-use crate::environment::Environment;
 use crate::error::Result;
-use crate::path::World;
+use crate::path::{Lit, World};
 
 /// Samples of it for one exact sample, where the denoised picture is all that is wanted. Exact samples show the cache's
 /// error; more of them leave the picture as it is (0 to 3 % of FLIP for 4 in place of 8) and take longer.
@@ -53,11 +52,7 @@ impl<'s> CachedPicture<Session<'s>> {
     ///
     /// # Errors
     /// As [`Session::set_grid`].
-    pub(crate) fn beside(
-        main: &Session<'_>,
-        world: &'s World,
-        environment: &'s Environment,
-    ) -> Result<Self> {
+    pub(crate) fn beside(main: &Session<'_>, (world, environment): Lit<'s>) -> Result<Self> {
         let mut session = Session::new(world, environment, view(main.view()));
         session.finish_learning();
         main.grid().map_or(Ok(()), |grid| session.set_grid(grid.clone()))?;

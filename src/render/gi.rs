@@ -6,8 +6,7 @@ use glam::Vec3;
 
 use super::view::{Gi, View};
 use super::view_probe::middle_distance;
-use crate::environment::Environment;
-use crate::path::World;
+use crate::path::Lit;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
 
@@ -40,8 +39,7 @@ pub(crate) struct CacheTraining {
 impl CacheTraining {
     /// `None` if paths are followed to their end.
     pub(super) fn new(
-        world: &World,
-        environment: &Environment,
+        (world, environment): Lit<'_>,
         view: &View,
         rays: &CameraRays,
     ) -> Option<Self> {
@@ -141,9 +139,9 @@ pub(super) mod tests {
     use glam::Vec2;
 
     use super::*;
-    use crate::environment::{EnvironmentOptions, sky};
+    use crate::environment::{Environment, EnvironmentOptions, sky};
     use crate::light_grid::{DistributionOptions, LightGrid};
-    use crate::path::PathLimits;
+    use crate::path::{PathLimits, World};
     use crate::render::filter::PixelFilter;
     use crate::render::{Sampling, Sharing, cpu};
     use crate::scene::builtin;
@@ -176,9 +174,9 @@ pub(super) mod tests {
         let (world, environment, view) = office();
         let rays = view.rays();
         let distributions = LightGrid::whole_map(environment.tile_energies());
-        let tracer = view.tracer(&world, &environment, distributions.as_ref());
+        let tracer = view.tracer((&world, &environment), distributions.as_ref());
         let training =
-            CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
+            CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
         let places = (0..900).filter_map(|i| {
             let at = Vec2::new((i % 30) as f32 * 2.1, (i / 30) as f32 * 1.2);
             let ray = rays.ray(at, Vec2::ZERO);
@@ -214,7 +212,7 @@ pub(super) mod tests {
         let (world, environment, view) = office();
         let rays = view.rays();
         let mut training =
-            CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
+            CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
         let edge = training.sums.cells().edge;
         let cells = CacheCells { edge: edge / 64.0, ..*training.sums.cells() };
         training.sums = RadianceSums::new(cells, 1.0);

@@ -10,8 +10,8 @@ use crate::bvh::Ray;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::World;
 use crate::path::camera::CameraRays;
+use crate::path::{Lit, World};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
 pub use super::devices::DeviceChoice;
@@ -125,7 +125,7 @@ pub(crate) enum Renderer {}
 impl Renderer {
     pub(crate) fn new(
         uploaded: &UploadedScene,
-        _: (&World, &Environment),
+        _: Lit<'_>,
         _: &View,
         _: &CameraRays,
         _: Option<&Film>,
@@ -139,11 +139,7 @@ impl Renderer {
 pub(crate) enum Caster {}
 
 impl Caster {
-    pub(crate) fn new(
-        uploaded: &UploadedScene,
-        _: (&World, &Environment),
-        _: &View,
-    ) -> Result<Self> {
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View) -> Result<Self> {
         match *uploaded {}
     }
 }

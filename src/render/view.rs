@@ -5,11 +5,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::filter::PixelFilter;
-use crate::environment::Environment;
 use crate::light_grid::{DistributionOptions, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::{Background, PathLimits, PathTracer, World};
+use crate::path::{Background, Lit, PathLimits, PathTracer, World};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium};
 
@@ -210,12 +209,8 @@ impl View {
     }
 
     /// What follows its paths by these distributions; it counts nothing, and no path ends in a cache.
-    pub(crate) fn tracer<'a>(
-        &self,
-        world: &'a World,
-        environment: &'a Environment,
-        grid: Option<&'a LightGrid>,
-    ) -> PathTracer<'a> {
+    pub(crate) fn tracer<'a>(&self, lit: Lit<'a>, grid: Option<&'a LightGrid>) -> PathTracer<'a> {
+        let (world, environment) = lit;
         PathTracer {
             world,
             environment,

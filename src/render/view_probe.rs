@@ -6,10 +6,9 @@ use rayon::prelude::*;
 use super::view::View;
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
-use crate::environment::Environment;
 use crate::math::Frame;
 use crate::path::camera::CameraRays;
-use crate::path::{CutOff, MAX_INTERFACES, World};
+use crate::path::{CutOff, Lit, MAX_INTERFACES, World};
 use crate::sampler::Sampler;
 
 /// Rays along each axis of the picture.
@@ -59,10 +58,10 @@ const PATHS: usize = 4;
 const MIN_CUT_OFF: f32 = 0.02;
 
 /// What limits take of the picture's paths, in the mean.
-fn cut_off(world: &World, environment: &Environment, view: &View) -> CutOff {
+fn cut_off(lit: Lit<'_>, view: &View) -> CutOff {
     let [width, height] = view.whole_size();
     let rays = CameraRays::new(&view.camera, width, height);
-    let tracer = view.tracer(world, environment, None);
+    let tracer = view.tracer(lit, None);
     let places: Vec<Vec2> = places([width, height]).collect();
     let of_path = |index: usize| {
         let (place, path) = (index % places.len(), index / places.len());
@@ -77,15 +76,11 @@ fn cut_off(world: &World, environment: &Environment, view: &View) -> CutOff {
 }
 
 /// A sentence where paths end with much of their light left, unless direct light alone is asked for.
-pub(crate) fn cut_off_notice(
-    world: &World,
-    environment: &Environment,
-    view: &View,
-) -> Option<String> {
+pub(crate) fn cut_off_notice(lit: Lit<'_>, view: &View) -> Option<String> {
     if view.limits.bounces <= 1 {
         return None;
     }
-    let CutOff { by_bounces, by_interfaces } = cut_off(world, environment, view);
+    let CutOff { by_bounces, by_interfaces } = cut_off(lit, view);
     let share = by_bounces.max(by_interfaces);
     let (what, remedy) = if by_bounces > by_interfaces {
         (format!("{} bounces", view.limits.bounces), "; more bounces show it")
@@ -118,7 +113,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::environment::EnvironmentOptions;
+    use crate::environment::{Environment, EnvironmentOptions};
     use crate::image::Image;
     use crate::path::{PathLimits, WorldBuilder};
     use crate::scene::{Camera, Material};
@@ -137,10 +132,10 @@ mod tests {
             ..View::new(camera.clone(), [32, 32])
         };
         let white = room(&Material::lambert(0.8));
-        let taken = cut_off(&white, &map, &view(8));
+        let taken = cut_off((&white, &map), &view(8));
         assert!((taken.by_bounces / 0.8_f32.powi(8) - 1.0).abs() < 0.1, "{taken:?}");
         assert_eq!(taken.by_interfaces, 0.0);
-        let notice = |world, bounces| cut_off_notice(world, &map, &view(bounces));
+        let notice = |world, bounces| cut_off_notice((world, &map), &view(bounces));
         assert!(notice(&white, 8).is_some_and(|said| said.contains("8 bounces with 1")));
         // One bounce asks for direct light; 32 leave out less than is seen.
         assert_eq!(notice(&white, 1).or(notice(&white, 32)), None);

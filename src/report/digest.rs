@@ -4,21 +4,16 @@ use std::sync::atomic::AtomicBool;
 
 use super::plan::{Frame, Settings};
 use crate::digest::Digest;
-use crate::environment::Environment;
 use crate::error::Result;
-use crate::path::World;
+use crate::path::Lit;
 use crate::render::{Sampling, Session};
 use crate::scene::Camera;
 
 /// Digest of all that a picture converges to: scene, map, camera, size and bounces. A tiny rendered picture
 /// is part of it, which nearly any change of the renderer changes: references of an older renderer are
 /// therefore not reused.
-pub(super) fn of_picture(
-    world: &World,
-    environment: &Environment,
-    camera: &Camera,
-    frame: &Frame,
-) -> Result<Digest> {
+pub(super) fn of_picture(lit: Lit<'_>, camera: &Camera, frame: &Frame) -> Result<Digest> {
+    let (world, environment) = lit;
     let digest =
         Digest::new().scene(&world.scene).debug(camera).debug(frame).map(environment.map());
     let size = PROBE_SIZE;

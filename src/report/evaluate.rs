@@ -5,205 +5,186 @@ use super::context::{Context, RowState};
 use super::measure::Run;
 use super::plan::{MIN_PICTURES, SHARE_RUNS, Settings};
 use super::reference::Noise;
-use super::shares::shares;
 use super::summary::{Measure, ReferenceReport, RowReport};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::metrics::compare;
 use crate::render::Sampling;
 
-/// Adds pictures to the reference until it has `pictures` of them; `false` if it was cancelled.
-pub(super) fn grow_reference(
-    context: &Context<'_>,
-    state: &mut RowState,
-    pictures: u32,
-) -> Result<bool> {
-    let fastest = context.fastest(state);
-    let settings = &Settings::of(Sampling::Adaptive);
-    let Some(mut reference) = state.reference.take() else { return Ok(true) };
-    let mut is_whole = true;
-    while is_whole && reference.facts.pictures < pictures {
-        let done = reference.facts.pictures;
-        context.say(
-            &format!("{}: reference, picture {} of {pictures}", state.prepared.title, done + 1),
-            f64::from(pictures - done) * context.plan.effort.seconds,
-            state.rows_after,
-        );
-        let place = state.prepared.place(context.plan, &context.devices[fastest], settings);
-        let (seconds, cancel) = (context.plan.effort.seconds, context.options.cancel);
-        is_whole =
-            reference.add_picture(&place, &context.devices[fastest].name, seconds, cancel)?
-                && !context.is_cancelled();
-        if reference.is_black() {
-            return Err(Error::new(format!(
-                "{}: the picture is black, and errors relative to it have no meaning",
-                state.prepared.title
-            )));
-        }
-    }
-    state.reference = Some(reference);
-    Ok(is_whole)
-}
-
-/// Adds pictures to the reference until its noise is small beside the smallest error, and computes all errors
-/// against it; `false` if it was cancelled.
-pub(super) fn refine_reference(context: &Context<'_>, state: &mut RowState) -> Result<bool> {
-    loop {
-        evaluate_runs(context, state)?;
-        let Some(reference) = &state.reference else { return Ok(true) };
-        let missing = reference.pictures_missing(
-            context.plan.effort.reference_noise,
-            smallest_error(state).unwrap_or(0.0),
-        );
-        if missing == 0 {
-            return Ok(true);
-        }
-        let pictures = reference.facts.pictures + missing;
-        if !grow_reference(context, state, pictures)? {
-            evaluate_runs(context, state)?;
-            return Ok(false);
-        }
-    }
-}
-
-/// Computes the errors again of all runs whose pictures are stored, if the reference has changed.
-fn evaluate_runs(context: &Context<'_>, state: &mut RowState) -> Result<()> {
-    let Some((reference, pictures)) = context.reference(state) else { return Ok(()) };
-    for (key, run) in state.runs.iter_mut().flatten().flatten() {
-        let is_new = run.points.iter().all(|p| p.errors.is_some())
-            && pictures.is_some()
-            && run.reference_pictures == pictures;
-        if is_new {
-            continue;
-        }
-        if let Some((films, denoised)) = context.pictures(key, run) {
-            run.evaluate(&films, &denoised, &reference)?;
-            run.reference_pictures = pictures;
-            context.store.write(key, run)?;
-        }
-    }
-    Ok(())
-}
-
-/// Splits the error of the compared methods by its sources; `false` if it was cancelled.
-pub(super) fn find_shares(
-    context: &Context<'_>,
-    state: &RowState,
-    row: &mut RowReport,
-) -> Result<bool> {
-    let fastest = context.fastest(state);
-    let Some((reference, _)) = context.reference(state) else { return Ok(true) };
-    for method in context.plan.compared() {
-        let runs = context.plan.methods.iter().position(|m| m.name == method.name);
-        let run = runs.and_then(|index| state.runs[fastest][index].first());
-        let Some(samples) = run.and_then(|(_, run)| Some(run.points.last()?.samples)) else {
-            continue;
-        };
-        let key = format!("{}_shares", context.key(state, fastest, method, 0));
-        let found = match context.store.read(&key) {
-            Some(found) => found,
-            None => {
-                context.say(
-                    &format!("{}: sources of {}'s error", state.prepared.title, method.name),
-                    SHARE_RUNS * context.plan.effort.seconds,
-                    state.rows_after,
-                );
-                let place =
-                    state.prepared.place(context.plan, &context.devices[fastest], &method.settings);
-                let method = (method.name.as_str(), &method.settings);
-                let samples = (samples / 8).max(4);
-                let found = shares(&place, method, samples, &reference, context.options.cancel)?;
-                let Some(found) = found else { return Ok(false) };
-                context.store.write(&key, &found)?;
-                found
+impl Context<'_> {
+    /// Adds pictures to the reference until it has `pictures` of them; `false` if it was cancelled.
+    pub(super) fn grow_reference(&self, state: &mut RowState, pictures: u32) -> Result<bool> {
+        let fastest = self.fastest(state);
+        let settings = &Settings::of(Sampling::Adaptive);
+        let Some(mut reference) = state.reference.take() else { return Ok(true) };
+        let mut is_whole = true;
+        while is_whole && reference.facts.pictures < pictures {
+            let done = reference.facts.pictures;
+            self.say(
+                &format!("{}: reference, picture {} of {pictures}", state.prepared.title, done + 1),
+                f64::from(pictures - done) * self.plan.effort.seconds,
+                state.rows_after,
+            );
+            let place = self.place(state, fastest, settings);
+            is_whole =
+                reference.add_picture(&place, self.plan.effort.seconds)? && !self.is_cancelled();
+            if reference.is_black() {
+                return Err(Error::new(format!(
+                    "{}: the picture is black, and errors relative to it have no meaning",
+                    state.prepared.title
+                )));
             }
-        };
-        row.shares.push(found);
+        }
+        state.reference = Some(reference);
+        Ok(is_whole)
     }
-    Ok(true)
-}
 
-/// Estimates each method's bias from two or more runs.
-pub(super) fn find_biases(
-    context: &Context<'_>,
-    state: &RowState,
-    row: &mut RowReport,
-) -> Result<()> {
-    let Some((reference, pictures)) = context.reference(state) else { return Ok(()) };
-    let pictures = pictures.unwrap_or_default();
-    for (device, methods) in state.runs.iter().enumerate() {
-        for (method, runs) in context.plan.methods.iter().zip(methods) {
-            let Some((key, _)) = runs.first() else { continue };
-            let key = format!("{key}_bias_of_{}_by_{pictures}", runs.len());
-            let found = match context.store.read(&key) {
-                Some(found) => Some(found),
+    /// Adds pictures to the reference until its noise is small beside the smallest error, and computes all errors
+    /// against it; `false` if it was cancelled.
+    pub(super) fn refine_reference(&self, state: &mut RowState) -> Result<bool> {
+        loop {
+            self.evaluate_runs(state)?;
+            let Some(reference) = &state.reference else { return Ok(true) };
+            let missing = reference.pictures_missing(
+                self.plan.effort.reference_noise,
+                smallest_error(state).unwrap_or(0.0),
+            );
+            if missing == 0 {
+                return Ok(true);
+            }
+            let pictures = reference.facts.pictures + missing;
+            if !self.grow_reference(state, pictures)? {
+                self.evaluate_runs(state)?;
+                return Ok(false);
+            }
+        }
+    }
+
+    /// Computes the errors again of all runs whose pictures are stored, if the reference has changed.
+    fn evaluate_runs(&self, state: &mut RowState) -> Result<()> {
+        let Some((reference, pictures)) = self.reference(state) else { return Ok(()) };
+        for (key, run) in state.runs.iter_mut().flatten().flatten() {
+            let is_new = run.points.iter().all(|p| p.errors.is_some())
+                && pictures.is_some()
+                && run.reference_pictures == pictures;
+            if is_new {
+                continue;
+            }
+            if let Some((films, denoised)) = self.pictures(key, run) {
+                run.evaluate(&films, &denoised, &reference)?;
+                run.reference_pictures = pictures;
+                self.store.write(key, run)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Splits the error of the compared methods by its sources; `false` if it was cancelled.
+    pub(super) fn find_shares(&self, state: &RowState, row: &mut RowReport) -> Result<bool> {
+        let fastest = self.fastest(state);
+        let Some((reference, _)) = self.reference(state) else { return Ok(true) };
+        for method in self.plan.compared() {
+            let runs = self.plan.methods.iter().position(|m| m.name == method.name);
+            let run = runs.and_then(|index| state.runs[fastest][index].first());
+            let Some(samples) = run.and_then(|(_, run)| Some(run.points.last()?.samples)) else {
+                continue;
+            };
+            let key = format!("{}_shares", self.key(state, fastest, method, 0));
+            let found = match self.store.read(&key) {
+                Some(found) => found,
                 None => {
-                    let device = context.devices[device].device.title();
-                    let bias = context
-                        .last_pictures(runs)
-                        .and_then(|p| Bias::new(device, &method.name, &p, &reference));
-                    bias.iter().try_for_each(|bias| context.store.write(&key, bias))?;
-                    bias
+                    self.say(
+                        &format!("{}: sources of {}'s error", state.prepared.title, method.name),
+                        SHARE_RUNS * self.plan.effort.seconds,
+                        state.rows_after,
+                    );
+                    let place = self.place(state, fastest, &method.settings);
+                    let found = place.shares(method, (samples / 8).max(4), &reference)?;
+                    let Some(found) = found else { return Ok(false) };
+                    self.store.write(&key, &found)?;
+                    found
                 }
             };
-            row.biases.extend(found);
+            row.shares.push(found);
         }
+        Ok(true)
     }
-    Ok(())
-}
 
-pub(super) fn reference_report(
-    context: &Context<'_>,
-    state: &RowState,
-) -> Result<Option<ReferenceReport>> {
-    let error = smallest_error(state);
-    let noise = match &state.reference {
-        Some(reference) => {
-            if reference.facts.pictures < MIN_PICTURES {
-                return Ok(None);
+    /// Estimates each method's bias from two or more runs.
+    pub(super) fn find_biases(&self, state: &RowState, row: &mut RowReport) -> Result<()> {
+        let Some((reference, pictures)) = self.reference(state) else { return Ok(()) };
+        let pictures = pictures.unwrap_or_default();
+        for (device, methods) in state.runs.iter().enumerate() {
+            for (method, runs) in self.plan.methods.iter().zip(methods) {
+                let Some((key, _)) = runs.first() else { continue };
+                let key = format!("{key}_bias_of_{}_by_{pictures}", runs.len());
+                let found = match self.store.read(&key) {
+                    Some(found) => Some(found),
+                    None => {
+                        let device = self.devices[device].device.title();
+                        let bias = self
+                            .last_pictures(runs)
+                            .and_then(|p| Bias::new(device, &method.name, &p, &reference));
+                        bias.iter().try_for_each(|bias| self.store.write(&key, bias))?;
+                        bias
+                    }
+                };
+                row.biases.extend(found);
             }
-            Some(reference.noise())
         }
-        None => noise_of_file(context, state)?,
-    };
-    let share = noise.zip(error).map(|(noise, error)| noise.trimmed_rel_mse / error);
-    Ok(Some(ReferenceReport {
-        file: context.plan.reference.as_ref().map(|path| path.display().to_string()),
-        facts: state.reference.as_ref().map(|reference| reference.facts.clone()),
-        noise,
-        share,
-        // The noise of a given file is estimated from noisy pictures, so its share has rounding errors.
-        is_good: share.is_some_and(|share| share <= 1.0001 * context.plan.effort.reference_noise),
-    }))
-}
-
-/// Noise of a given reference: how much farther the mean of all runs of the best method is from it than
-/// that mean's own spread explains. `None` with a single run.
-fn noise_of_file(context: &Context<'_>, state: &RowState) -> Result<Option<Noise>> {
-    let Some((reference, _)) = &context.file_reference else { return Ok(None) };
-    let all = state.runs.iter().flatten().filter(|runs| runs.len() > 1);
-    let best = all.min_by(|a, b| mean_error(a).total_cmp(&mean_error(b)));
-    let Some(runs) = best else { return Ok(None) };
-    let Some(films) = context.last_pictures(runs) else { return Ok(None) };
-    let count = films.len() as f64;
-    let mut mean = Image::filled(reference.width, reference.height, [0.0; 3]);
-    let mut variances = vec![[0.0; 3]; reference.pixels.len()];
-    for (i, (mean, variance)) in mean.pixels.iter_mut().zip(&mut variances).enumerate() {
-        for c in 0..3 {
-            let values = films.iter().map(|film| f64::from(film.pixels[i][c]));
-            let average = values.clone().sum::<f64>() / count;
-            let squares: f64 = values.map(|v| (v - average).powi(2)).sum();
-            mean[c] = average as f32;
-            variance[c] = squares / (count - 1.0) / count;
-        }
+        Ok(())
     }
-    let found = compare(&mean, reference)?;
-    let own = Noise::of(&variances, reference);
-    Ok(Some(Noise {
-        mse: (found.mse - own.mse).max(0.0),
-        rel_mse: (found.rel_mse - own.rel_mse).max(0.0),
-        trimmed_rel_mse: (found.trimmed_rel_mse - own.trimmed_rel_mse).max(0.0),
-    }))
+
+    pub(super) fn reference_report(&self, state: &RowState) -> Result<Option<ReferenceReport>> {
+        let error = smallest_error(state);
+        let noise = match &state.reference {
+            Some(reference) => {
+                if reference.facts.pictures < MIN_PICTURES {
+                    return Ok(None);
+                }
+                Some(reference.noise())
+            }
+            None => self.noise_of_file(state)?,
+        };
+        let share = noise.zip(error).map(|(noise, error)| noise.trimmed_rel_mse / error);
+        Ok(Some(ReferenceReport {
+            file: self.plan.reference.as_ref().map(|path| path.display().to_string()),
+            facts: state.reference.as_ref().map(|reference| reference.facts.clone()),
+            noise,
+            share,
+            // The noise of a given file is estimated from noisy pictures, so its share has rounding errors.
+            is_good: share.is_some_and(|share| share <= 1.0001 * self.plan.effort.reference_noise),
+        }))
+    }
+
+    /// Noise of a given reference: how much farther the mean of all runs of the best method is from it than
+    /// that mean's own spread explains. `None` with a single run.
+    fn noise_of_file(&self, state: &RowState) -> Result<Option<Noise>> {
+        let Some((reference, _)) = &self.file_reference else { return Ok(None) };
+        let all = state.runs.iter().flatten().filter(|runs| runs.len() > 1);
+        let best = all.min_by(|a, b| mean_error(a).total_cmp(&mean_error(b)));
+        let Some(runs) = best else { return Ok(None) };
+        let Some(films) = self.last_pictures(runs) else { return Ok(None) };
+        let count = films.len() as f64;
+        let mut mean = Image::filled(reference.width, reference.height, [0.0; 3]);
+        let mut variances = vec![[0.0; 3]; reference.pixels.len()];
+        for (i, (mean, variance)) in mean.pixels.iter_mut().zip(&mut variances).enumerate() {
+            for c in 0..3 {
+                let values = films.iter().map(|film| f64::from(film.pixels[i][c]));
+                let average = values.clone().sum::<f64>() / count;
+                let squares: f64 = values.map(|v| (v - average).powi(2)).sum();
+                mean[c] = average as f32;
+                variance[c] = squares / (count - 1.0) / count;
+            }
+        }
+        let found = compare(&mean, reference)?;
+        let own = Noise::of(&variances, reference);
+        Ok(Some(Noise {
+            mse: (found.mse - own.mse).max(0.0),
+            rel_mse: (found.rel_mse - own.rel_mse).max(0.0),
+            trimmed_rel_mse: (found.trimmed_rel_mse - own.trimmed_rel_mse).max(0.0),
+        }))
+    }
 }
 
 /// Smallest mean error at the end of all methods and devices.

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Frame, Settings};
+use super::plan::{Frame, Method, Settings};
 use crate::denoise::quick;
 use crate::environment::Environment;
 use crate::error::Result;
@@ -26,13 +26,17 @@ pub(super) struct Place<'a> {
     pub(super) table_seconds: f64,
     /// Scene and map on the GPU, if that is the device.
     pub(super) upload: Option<&'a gpu::UploadedScene>,
+    /// Name of the device.
+    pub(super) device: &'a str,
+    /// Ends what is measured.
+    pub(super) cancel: &'a AtomicBool,
 }
 
 impl<'a> Place<'a> {
     /// A session of one method.
     pub(super) fn session(&self, settings: &Settings, seed: u32) -> Result<Session<'a>> {
         let view = settings.view(self.camera, self.frame, seed);
-        Session::on(self.world, self.environment, view, self.upload)
+        Session::on((self.world, self.environment), view, self.upload)
     }
 
     /// Learns and renders a little, so that all kernels are built.
@@ -47,14 +51,74 @@ impl<'a> Place<'a> {
     }
 
     /// A session that has learned, with what drives it on; `None` if it was cancelled.
-    pub(super) fn learned(
-        &self,
-        settings: &Settings,
-        seed: u32,
-        cancel: &AtomicBool,
-    ) -> Result<Option<Driver<'a>>> {
+    pub(super) fn learned(&self, settings: &Settings, seed: u32) -> Result<Option<Driver<'a>>> {
         let mut driver = Driver::new(self.session(settings, seed)?, StopRule::default());
-        Ok(driver.learn(cancel)?.then_some(driver))
+        Ok(driver.learn(self.cancel)?.then_some(driver))
+    }
+
+    /// Runs a method for `seconds`; `None` if it was cancelled. The time of copying pictures does not count.
+    pub(super) fn measure(
+        &self,
+        method: &Method,
+        seed: u32,
+        seconds: f64,
+    ) -> Result<Option<Finished>> {
+        let rule = StopRule { seconds: Some(seconds), ..StopRule::default() };
+        let mut driver = Driver::new(self.session(&method.settings, seed)?, rule);
+        if !driver.learn(self.cancel)? {
+            return Ok(None);
+        }
+        let (mut points, mut films) = (Vec::new(), Vec::new());
+        let mut next = seconds * FIRST_SHARE;
+        loop {
+            driver.advance(self.cancel)?;
+            if self.cancel.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let session = &mut driver.session;
+            if self.table_seconds + session.figures().elapsed_seconds() < next.min(seconds) {
+                continue;
+            }
+            session.settle()?;
+            let figures = session.figures();
+            let elapsed = self.table_seconds + figures.elapsed_seconds();
+            points.push(Point {
+                seconds: elapsed,
+                render_seconds: figures.render_seconds,
+                samples: session.samples(),
+                rays: figures.rays,
+                errors: None,
+            });
+            films.push(session.film().image());
+            if elapsed >= seconds {
+                break;
+            }
+            next = next.max(elapsed / STEP) * STEP;
+        }
+        let session = driver.session;
+        let run = Run {
+            method: method.name.clone(),
+            seed,
+            table_seconds: self.table_seconds,
+            figures: session.figures(),
+            memory: self.memory(&session),
+            nanoseconds_per_ray: None,
+            points,
+            denoised_flip: None,
+            reference_pictures: None,
+        };
+        let denoised = quick(session.film(), None);
+        Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
+    }
+
+    fn memory(&self, session: &Session<'_>) -> Memory {
+        Memory {
+            table_bytes: self.environment.memory_bytes().table as u64,
+            bvh_bytes: self.world.bvh.memory_bytes() as u64,
+            grid_peak_bytes: session.figures().grid_peak_bytes as u64,
+            grid_bytes: session.figures().grid_bytes as u64,
+            device_bytes: session.gpu_figures().map(|gpu| gpu.device_bytes),
+        }
     }
 }
 
@@ -126,72 +190,6 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 
 /// The first point is at most at this share of the run's time.
 const FIRST_SHARE: f64 = 1.0 / 256.0;
-
-/// Runs a method for `seconds`; `None` if it was cancelled. The time of copying pictures does not count.
-pub(super) fn measure(
-    place: &Place<'_>,
-    method: (&str, &Settings),
-    seed: u32,
-    seconds: f64,
-    cancel: &AtomicBool,
-) -> Result<Option<Finished>> {
-    let rule = StopRule { seconds: Some(seconds), ..StopRule::default() };
-    let mut driver = Driver::new(place.session(method.1, seed)?, rule);
-    if !driver.learn(cancel)? {
-        return Ok(None);
-    }
-    let (mut points, mut films) = (Vec::new(), Vec::new());
-    let mut next = seconds * FIRST_SHARE;
-    loop {
-        driver.advance(cancel)?;
-        if cancel.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-        let session = &mut driver.session;
-        if place.table_seconds + session.figures().elapsed_seconds() < next.min(seconds) {
-            continue;
-        }
-        session.settle()?;
-        let figures = session.figures();
-        let elapsed = place.table_seconds + figures.elapsed_seconds();
-        points.push(Point {
-            seconds: elapsed,
-            render_seconds: figures.render_seconds,
-            samples: session.samples(),
-            rays: figures.rays,
-            errors: None,
-        });
-        films.push(session.film().image());
-        if elapsed >= seconds {
-            break;
-        }
-        next = next.max(elapsed / STEP) * STEP;
-    }
-    let session = driver.session;
-    let run = Run {
-        method: method.0.to_owned(),
-        seed,
-        table_seconds: place.table_seconds,
-        figures: session.figures(),
-        memory: memory(place, &session),
-        nanoseconds_per_ray: None,
-        points,
-        denoised_flip: None,
-        reference_pictures: None,
-    };
-    let denoised = quick(session.film(), None);
-    Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
-}
-
-fn memory(place: &Place<'_>, session: &Session<'_>) -> Memory {
-    Memory {
-        table_bytes: place.environment.memory_bytes().table as u64,
-        bvh_bytes: place.world.bvh.memory_bytes() as u64,
-        grid_peak_bytes: session.figures().grid_peak_bytes as u64,
-        grid_bytes: session.figures().grid_bytes as u64,
-        device_bytes: session.gpu_figures().map(|gpu| gpu.device_bytes),
-    }
-}
 
 impl Run {
     /// Computes the errors of its pictures, one for each point, and of the denoised last one.

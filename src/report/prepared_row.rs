@@ -6,10 +6,10 @@ use std::time::Instant;
 use super::digest;
 use super::machine::OpenDevice;
 use super::measure::Place;
-use super::plan::{Plan, Row, Settings};
+use super::plan::{Frame, Plan, Row, Settings};
 use crate::digest::Digest;
 use crate::environment::{Environment, EnvironmentOptions};
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Notices, Result};
 use crate::light_grid::LightGrid;
 use crate::path::{World, framing};
 use crate::render::{Sampling, gpu};
@@ -20,6 +20,7 @@ pub(super) struct PreparedRow {
     pub(super) title: String,
     pub(super) world: World,
     camera: Camera,
+    frame: Frame,
     lights: Vec<Light>,
     pub(super) map_size: (u32, u32),
     pub(super) notices: Notices,
@@ -53,8 +54,7 @@ impl PreparedRow {
             }
             let map = map.clone();
             let start = Instant::now();
-            let environment =
-                Environment::new(map, &options).map_err(|e| Error::at(&row.map, e))?;
+            let environment = Environment::new(map, &options).at(&row.map)?;
             let seconds = start.elapsed().as_secs_f64();
             lights.push(Light { options, environment, seconds, upload: None });
         }
@@ -64,8 +64,9 @@ impl PreparedRow {
             None => framing::frame(&world, aspect),
         };
         let digest =
-            digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
-        Ok(Self { title: row.title.clone(), world, camera, lights, map_size, notices, digest })
+            digest::of_picture((&world, &lights[0].environment), &camera, &plan.effort.frame)?;
+        let (title, frame) = (row.title.clone(), plan.effort.frame.clone());
+        Ok(Self { title, world, camera, frame, lights, map_size, notices, digest })
     }
 
     /// Puts the scene under every map onto a GPU; nothing for the CPU.
@@ -90,9 +91,8 @@ impl PreparedRow {
     /// The place of runs with these settings.
     pub(super) fn place<'a>(
         &'a self,
-        plan: &'a Plan,
-        device: &OpenDevice,
         settings: &Settings,
+        (device, cancel): (&'a OpenDevice, &'a AtomicBool),
     ) -> Place<'a> {
         let options = settings.environment();
         let light =
@@ -100,10 +100,12 @@ impl PreparedRow {
         Place {
             world: &self.world,
             camera: &self.camera,
-            frame: &plan.effort.frame,
+            frame: &self.frame,
             environment: &light.environment,
             table_seconds: light.seconds,
             upload: light.upload.as_ref().filter(|_| device.gpu.is_some()),
+            device: &device.name,
+            cancel,
         }
     }
 
@@ -111,34 +113,23 @@ impl PreparedRow {
     /// `seconds`.
     pub(super) fn time_rays(
         &mut self,
-        plan: &Plan,
         device: &OpenDevice,
         settings: &Settings,
         grid: Option<LightGrid>,
         seconds: f64,
     ) -> Result<Option<f64>> {
         self.world.start_ray_clock();
-        let rendered = self.render_for(plan, device, settings, grid, seconds);
+        let never = AtomicBool::new(false);
+        let render = || {
+            let mut session = self.place(settings, (device, &never)).session(settings, 0)?;
+            grid.map_or(Ok(()), |grid| session.set_grid(grid))?;
+            while session.figures().render_seconds < seconds {
+                session.advance(1, &never)?;
+            }
+            Ok(())
+        };
+        let rendered = render();
         let nanoseconds = self.world.stop_ray_clock();
         rendered.map(|()| nanoseconds)
-    }
-
-    fn render_for(
-        &self,
-        plan: &Plan,
-        device: &OpenDevice,
-        settings: &Settings,
-        grid: Option<LightGrid>,
-        seconds: f64,
-    ) -> Result<()> {
-        let mut session = self.place(plan, device, settings).session(settings, 0)?;
-        if let Some(grid) = grid {
-            session.set_grid(grid)?;
-        }
-        let never = AtomicBool::new(false);
-        while session.figures().render_seconds < seconds {
-            session.advance(1, &never)?;
-        }
-        Ok(())
     }
 }

@@ -6,14 +6,14 @@
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use serde::{Deserialize, Serialize};
 
 use super::measure::Place;
 use super::plan::{MIN_PICTURES, Settings};
 use crate::digest::Digest;
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::{Image, read_with_linearity, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
@@ -64,7 +64,7 @@ pub(super) fn variances_of_mean(sums: &[f64; 3], squares: &[f64; 3], count: f64)
 }
 
 /// Facts about a reference: the first line of its file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceFacts {
     /// Digest of the picture's limit.
     pub digest: String,
@@ -98,14 +98,7 @@ impl Reference {
         let path = folder.join(format!("{digest}.ref"));
         let pixels = size.0 as usize * size.1 as usize;
         Self::read(&path, &digest.to_string(), size).unwrap_or_else(|| Self {
-            facts: ReferenceFacts {
-                digest: digest.to_string(),
-                size,
-                pictures: 0,
-                samples_per_picture: 0,
-                seconds: 0.0,
-                device: String::new(),
-            },
+            facts: ReferenceFacts { digest: digest.to_string(), size, ..Default::default() },
             sums: vec![[0.0; 3]; pixels],
             squares: vec![[0.0; 3]; pixels],
             path,
@@ -129,7 +122,7 @@ impl Reference {
     }
 
     fn write(&self) -> Result<()> {
-        let header = serde_json::to_string(&self.facts).map_err(|e| Error::at(&self.path, e))?;
+        let header = serde_json::to_string(&self.facts).at(&self.path)?;
         write_beside_and_rename(&self.path, |file| {
             writeln!(file, "{header}")?;
             let numbers = self.sums.as_flattened().iter().chain(self.squares.as_flattened());
@@ -142,16 +135,10 @@ impl Reference {
     ///
     /// # Errors
     /// If the device fails or the file cannot be written.
-    pub(super) fn add_picture(
-        &mut self,
-        place: &Place<'_>,
-        device: &str,
-        seconds: f64,
-        cancel: &AtomicBool,
-    ) -> Result<bool> {
+    pub(super) fn add_picture(&mut self, place: &Place<'_>, seconds: f64) -> Result<bool> {
         let seed = FIRST_SEED + self.facts.pictures;
         let settings = Settings::of(Sampling::Adaptive);
-        let Some(mut driver) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
+        let Some(mut driver) = place.learned(&settings, seed)? else { return Ok(false) };
         let limit = self.facts.samples_per_picture;
         driver.rule.samples = (limit > 0).then_some(limit);
         let is_done = |session: &Session<'_>| {
@@ -160,8 +147,8 @@ impl Reference {
             if limit > 0 { samples >= limit } else { samples >= 4 && is_long }
         };
         while !is_done(&driver.session) {
-            driver.advance(cancel)?;
-            if cancel.load(Ordering::Relaxed) {
+            driver.advance(place.cancel)?;
+            if place.cancel.load(Ordering::Relaxed) {
                 return Ok(false);
             }
         }
@@ -169,7 +156,7 @@ impl Reference {
         session.settle()?;
         self.add(session.film());
         self.facts.seconds += session.figures().elapsed_seconds();
-        device.clone_into(&mut self.facts.device);
+        place.device.clone_into(&mut self.facts.device);
         self.write()?;
         Ok(true)
     }
@@ -202,11 +189,8 @@ impl Reference {
     /// Its expected squared error, from the spread of the pictures; infinite below two.
     pub(super) fn noise(&self) -> Noise {
         if self.facts.pictures < 2 {
-            return Noise {
-                mse: f64::INFINITY,
-                rel_mse: f64::INFINITY,
-                trimmed_rel_mse: f64::INFINITY,
-            };
+            let endless = f64::INFINITY;
+            return Noise { mse: endless, rel_mse: endless, trimmed_rel_mse: endless };
         }
         let count = f64::from(self.facts.pictures);
         let sums = self.sums.iter().zip(&self.squares);

@@ -4,11 +4,8 @@
 use std::time::{Duration, Instant};
 
 use super::context::{Context, Options, RowState, denoised};
-use super::evaluate::{
-    find_biases, find_shares, grow_reference, reference_report, refine_reference,
-};
 use super::machine::{Machine, OpenDevice};
-use super::measure::{Run, measure};
+use super::measure::Run;
 use super::pages::row_sentence;
 use super::plan::{MIN_PICTURES, Plan, Row, SHARE_RUNS};
 use super::prepared_row::PreparedRow;
@@ -91,7 +88,7 @@ impl Runner<'_> {
         self.report.rows.push(report);
         let reference = self.context.file_reference.is_none().then(|| {
             Reference::open(
-                self.context.store.references(),
+                &self.context.store.references,
                 prepared.digest,
                 self.context.plan.effort.frame.size,
             )
@@ -113,17 +110,17 @@ impl Runner<'_> {
         if state.refusals.iter().all(Option::is_some) {
             return self.update(&mut state);
         }
-        let mut is_whole = grow_reference(&self.context, &mut state, MIN_PICTURES)?;
+        let mut is_whole = self.context.grow_reference(&mut state, MIN_PICTURES)?;
         while is_whole {
-            is_whole = self.all_runs(&mut state)? && refine_reference(&self.context, &mut state)?;
+            is_whole = self.all_runs(&mut state)? && self.context.refine_reference(&mut state)?;
             if !is_whole || !self.remove_outdated(&mut state) {
                 break;
             }
         }
         self.update(&mut state)?;
         let Some(report) = self.report.rows.last_mut().filter(|_| is_whole) else { return Ok(()) };
-        if find_shares(&self.context, &state, report)? {
-            find_biases(&self.context, &state, report)?;
+        if self.context.find_shares(&state, report)? {
+            self.context.find_biases(&state, report)?;
             self.remove_pictures(&state);
         }
         Ok(())
@@ -165,26 +162,18 @@ impl Runner<'_> {
             }
         }
         self.say_run(state, device, method, seed);
-        let name = &plan.methods[method].name;
         let settings = &plan.methods[method].settings;
         if !self.make_ready(state, device, method) {
             return Ok(true);
         }
-        let place = state.prepared.place(plan, &self.context.devices[device], settings);
-        let seconds = plan.effort.seconds;
-        let cancel = self.context.options.cancel;
-        let Some(mut done) = measure(&place, (name, settings), seed, seconds, cancel)? else {
-            return Ok(false);
-        };
-        if seed == 0 && self.context.devices[device].gpu.is_none() {
-            let grid = done.grid.take();
-            done.run.nanoseconds_per_ray = state.prepared.time_rays(
-                plan,
-                &self.context.devices[device],
-                settings,
-                grid,
-                seconds.min(1.0),
-            )?;
+        let (place, seconds) = (self.context.place(state, device, settings), plan.effort.seconds);
+        let measured = place.measure(&plan.methods[method], seed, seconds)?;
+        let Some(mut done) = measured else { return Ok(false) };
+        let on = &self.context.devices[device];
+        if seed == 0 && on.gpu.is_none() {
+            let (grid, seconds) = (done.grid.take(), seconds.min(1.0));
+            let nanoseconds = state.prepared.time_rays(on, settings, grid, seconds)?;
+            done.run.nanoseconds_per_ray = nanoseconds;
         }
         if let Some((reference, pictures)) = self.context.reference(state) {
             done.run.evaluate(&done.films, &done.denoised, &reference)?;
@@ -208,9 +197,7 @@ impl Runner<'_> {
             return true;
         }
         let settings = &self.context.plan.methods[method].settings;
-        let place =
-            state.prepared.place(self.context.plan, &self.context.devices[device], settings);
-        let ready = place.warm_up(settings);
+        let ready = self.context.place(state, device, settings).warm_up(settings);
         self.accept(state, device, &ready)
     }
 
@@ -261,7 +248,7 @@ impl Runner<'_> {
         let plan = self.context.plan;
         let reference = self.context.reference(state);
         let threads = self.report.machine.threads;
-        let reference_report = reference_report(&self.context, state)?;
+        let reference_report = self.context.reference_report(state)?;
         let mut pictures =
             Pictures { reference: reference.map(|(image, _)| image), runs: Vec::new() };
         let mut devices = Vec::new();
@@ -293,7 +280,7 @@ impl Runner<'_> {
     }
 
     fn write_pages(&mut self) -> Result<()> {
-        super::pages::write(&self.report, self.context.store.root())?;
+        super::pages::write(&self.report, &self.context.store.root)?;
         self.pages_written = Some(Instant::now());
         Ok(())
     }

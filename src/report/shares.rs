@@ -4,12 +4,12 @@
 //! its random numbers in order, the pictures differ by later vertices and by the first one exactly;
 //! several seeds give each part's variance.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use serde::{Deserialize, Serialize};
 
 use super::measure::Place;
-use super::plan::{Frame, Settings};
+use super::plan::{Frame, Method, Settings};
 use super::reference::{relative, variances_of_mean};
 use crate::error::Result;
 use crate::image::Image;
@@ -56,74 +56,67 @@ struct Sums {
     square: [[f64; 3]; 4],
 }
 
-/// Splits a method's error by its sources at `samples` samples per pixel; `None` if it was cancelled.
-pub(super) fn shares(
-    place: &Place<'_>,
-    (name, settings): (&str, &Settings),
-    samples: u32,
-    reference: &Image,
-    cancel: &AtomicBool,
-) -> Result<Option<Shares>> {
-    let mut sums = vec![Sums::default(); reference.pixels.len()];
-    for seed in FIRST_SEED..FIRST_SEED + PICTURES {
-        let Some([all, one, none]) = three_depths(place, settings, seed, samples, cancel)? else {
-            return Ok(None);
-        };
-        for (((sums, all), one), none) in sums.iter_mut().zip(&all).zip(&one).zip(&none) {
-            for c in 0..3 {
-                let parts = [all[c], none[c], one[c] - none[c], all[c] - one[c]];
-                for (part, x) in parts.into_iter().enumerate() {
-                    sums.value[part][c] += x;
-                    sums.square[part][c] += x * x;
+/// Means of a picture's pixels.
+type Means = Vec<[f64; 3]>;
+
+impl Place<'_> {
+    /// Splits a method's error by its sources at `samples` samples per pixel; `None` if it was cancelled.
+    pub(super) fn shares(
+        &self,
+        method: &Method,
+        samples: u32,
+        reference: &Image,
+    ) -> Result<Option<Shares>> {
+        let mut sums = vec![Sums::default(); reference.pixels.len()];
+        for seed in FIRST_SEED..FIRST_SEED + PICTURES {
+            let depths = self.depths(&method.settings, seed, samples)?;
+            let Some([all, one, none]) = depths else { return Ok(None) };
+            for (((sums, all), one), none) in sums.iter_mut().zip(&all).zip(&one).zip(&none) {
+                for c in 0..3 {
+                    let parts = [all[c], none[c], one[c] - none[c], all[c] - one[c]];
+                    for (part, x) in parts.into_iter().enumerate() {
+                        sums.value[part][c] += x;
+                        sums.square[part][c] += x * x;
+                    }
                 }
             }
         }
+        let [total, filter, first_vertex, later_vertices] = trimmed(&sums, reference);
+        let method = method.name.clone();
+        let pictures = PICTURES;
+        Ok(Some(Shares { method, pictures, samples, total, filter, first_vertex, later_vertices }))
     }
-    let [total, filter, first_vertex, later_vertices] = trimmed(&sums, reference);
-    let method = name.to_owned();
-    let pictures = PICTURES;
-    Ok(Some(Shares { method, pictures, samples, total, filter, first_vertex, later_vertices }))
-}
 
-/// Means per pixel with all bounces, with one and with none, from the same random numbers and distributions.
-fn three_depths(
-    place: &Place<'_>,
-    settings: &Settings,
-    seed: u32,
-    samples: u32,
-    cancel: &AtomicBool,
-) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
-    let Some(driver) = place.learned(settings, seed, cancel)? else { return Ok(None) };
-    let mut session = driver.session;
-    // Distributions of a picture with this many samples.
-    if finish(&mut session, samples, cancel)?.is_none() {
-        return Ok(None);
-    }
-    let grid = session.grid().cloned();
-    // Paths of one bounce would not share by default, and would then draw other numbers.
-    let settings = &Settings { sharing: session.view().sharing, ..settings.clone() };
-    let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
-    for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
-        let frame = Frame { bounces: bounces.min(place.frame.bounces), ..place.frame.clone() };
-        let mut session = Place { frame: &frame, ..*place }.session(settings, seed)?;
-        if let Some(grid) = &grid {
-            session.set_grid(grid.clone())?;
+    /// Means per pixel with all bounces, with one and with none, from the same random numbers and distributions.
+    fn depths(&self, settings: &Settings, seed: u32, samples: u32) -> Result<Option<[Means; 3]>> {
+        let Some(driver) = self.learned(settings, seed)? else { return Ok(None) };
+        let mut session = driver.session;
+        // Distributions of a picture with this many samples.
+        if self.finish(&mut session, samples)?.is_none() {
+            return Ok(None);
         }
-        let Some(means) = finish(&mut session, samples, cancel)? else { return Ok(None) };
-        *picture = means;
+        let grid = session.grid().cloned();
+        // Paths of one bounce would not share by default, and would then draw other numbers.
+        let settings = &Settings { sharing: session.view().sharing, ..settings.clone() };
+        let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
+        for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
+            let frame = Frame { bounces: bounces.min(self.frame.bounces), ..self.frame.clone() };
+            let mut session = Place { frame: &frame, ..*self }.session(settings, seed)?;
+            if let Some(grid) = &grid {
+                session.set_grid(grid.clone())?;
+            }
+            let Some(means) = self.finish(&mut session, samples)? else { return Ok(None) };
+            *picture = means;
+        }
+        Ok(Some(pictures))
     }
-    Ok(Some(pictures))
-}
 
-fn finish(
-    session: &mut Session<'_>,
-    samples: u32,
-    cancel: &AtomicBool,
-) -> Result<Option<Vec<[f64; 3]>>> {
-    session.advance(samples, cancel)?;
-    session.settle()?;
-    let is_whole = !cancel.load(Ordering::Relaxed);
-    Ok(is_whole.then(|| session.film().pixels().iter().map(Pixel::mean).collect()))
+    fn finish(&self, session: &mut Session<'_>, samples: u32) -> Result<Option<Means>> {
+        session.advance(samples, self.cancel)?;
+        session.settle()?;
+        let is_whole = !self.cancel.load(Ordering::Relaxed);
+        Ok(is_whole.then(|| session.film().pixels().iter().map(Pixel::mean).collect()))
+    }
 }
 
 /// Relative variance over pictures of each part, averaged without the worst pixels.

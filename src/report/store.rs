@@ -14,8 +14,10 @@ use crate::output::record::{to_value, write_json};
 /// A report's folder: pages at the top, runs and references below.
 #[derive(Debug, Clone)]
 pub(super) struct Store {
-    root: PathBuf,
-    references: PathBuf,
+    /// Where pages and plots go.
+    pub(super) root: PathBuf,
+    /// Where references are kept.
+    pub(super) references: PathBuf,
 }
 
 impl Store {
@@ -30,16 +32,6 @@ impl Store {
             crate::image::check_writable(&folder.join("test"))?;
         }
         Ok(Self { root: root.to_owned(), references })
-    }
-
-    /// Where pages and plots go.
-    pub(super) fn root(&self) -> &Path {
-        &self.root
-    }
-
-    /// Where references are kept.
-    pub(super) fn references(&self) -> &Path {
-        &self.references
     }
 
     fn path(&self, key: &str, extension: &str) -> PathBuf {

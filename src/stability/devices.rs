@@ -11,9 +11,8 @@ use super::reference::FloorReference;
 use super::scenes::{
     FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
-use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::{World, WorldBuilder};
+use crate::path::{Lit, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
@@ -69,7 +68,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
                 0.6,
             );
             let view = View { width: side, height: side, ..view(camera, Sampling::Plain, 1) };
-            let film = render(setting, &world, &environment, view.clone(), samples)?;
+            let film = render(setting, (&world, &environment), view.clone(), samples)?;
             let found = Deviations::of(luminances(&film), &reference.picture(&view, samples));
             let what = format!("{name}, {samples} a pixel");
             // The density is discontinuous at texel edges: the few samples that rounding moves across an edge are
@@ -88,19 +87,14 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
 fn against_cpu(setting: &Setting, (builder, camera): (WorldBuilder, Camera)) -> Result<Outcome> {
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
-    compare(setting, &world, &environment, view)
+    compare(setting, (&world, &environment), view)
 }
 
-fn compare(
-    setting: &Setting,
-    world: &World,
-    environment: &Environment,
-    view: View,
-) -> Result<Outcome> {
+fn compare(setting: &Setting, lit: Lit<'_>, view: View) -> Result<Outcome> {
     let on_cpu = Setting { gpu: None, ..*setting };
     let samples = setting.count(16, 256);
-    let cpu = render(&on_cpu, world, environment, view.clone(), samples)?;
-    let gpu = render(setting, world, environment, view, samples)?;
+    let cpu = render(&on_cpu, lit, view.clone(), samples)?;
+    let gpu = render(setting, lit, view, samples)?;
     let expected: Vec<f64> = luminances(&cpu).collect();
     let found = Deviations::of(luminances(&gpu), &expected);
     let ratio = mean(&gpu).luminance / mean(&cpu).luminance;
@@ -123,7 +117,7 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
     let never = AtomicBool::new(false);
     let on_gpu = UploadedScene::new(&gpu, &world, &environment)?;
     let view = view(camera, Sampling::Plain, 2);
-    let mut session = Session::on(&world, &environment, view, Some(&on_gpu))?;
+    let mut session = Session::on((&world, &environment), view, Some(&on_gpu))?;
     session.advance(4, &never)?;
     let before = session.film().clone();
     gpu.lose();
@@ -159,10 +153,10 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
     let small = view(camera, Sampling::Plain, 1);
     let large = View { width: side, height: side, ..small.clone() };
-    let refusal = Session::on(&world, &environment, large, Some(&uploaded)).err();
+    let refusal = Session::on((&world, &environment), large, Some(&uploaded)).err();
     let refusal = refusal.map(|e| e.to_string()).unwrap_or_default();
     let clear = refusal.contains("MiB") && !refusal.contains('\n');
-    let mut session = Session::on(&world, &environment, small, Some(&uploaded))?;
+    let mut session = Session::on((&world, &environment), small, Some(&uploaded))?;
     session.advance(1, &AtomicBool::new(false))?;
     Ok(Outcome::default()
         .at_least("refused with the numbers", f64::from(u8::from(clear)), 1.0)

@@ -80,7 +80,7 @@ fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
     let (world, environment) = (WorldBuilder::default().build(), constant(radiance)?);
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);
     let view = View { width: 1, height: 1, ..view(camera, Sampling::Plain, 1) };
-    let mut session = learned(setting, &world, &environment, view)?;
+    let mut session = learned(setting, (&world, &environment), view)?;
     session.advance(samples, &AtomicBool::new(false))?;
     let film = session.film();
     let found = film.pixels()[0].mean()[0];

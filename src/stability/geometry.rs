@@ -213,7 +213,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
     );
     let environment = sky("day")?;
     let view = view(camera, Sampling::Plain, 4);
-    let [a, b] = [&sound, &spoilt].map(|w| render(setting, w, &environment, view.clone(), 32));
+    let [a, b] = [&sound, &spoilt].map(|w| render(setting, (w, &environment), view.clone(), 32));
     let (a, b) = (a?, b?);
     let worst = a
         .pixels()
@@ -239,7 +239,8 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
             .quad(&lambert(0.5), corner, b, a)
             .build();
         let camera = Camera::look_at(Vec3::new(0.2, 3.0, 0.1), Vec3::ZERO, 0.5);
-        let film = render(setting, &world, &constant(1.0)?, view(camera, Sampling::Plain, 4), 64)?;
+        let film =
+            render(setting, (&world, &constant(1.0)?), view(camera, Sampling::Plain, 4), 64)?;
         // A plane in uniform light shows its albedo.
         let seen = |p: &crate::render::film::Pixel| p.mean_luminance();
         let most = film.pixels().iter().map(seen).fold(0.0, f64::max);
@@ -258,11 +259,11 @@ fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
     let of = |scale: f32| -> Result<Mean> {
         let (builder, camera) = room(0.7, scale, Vec3::ZERO);
         let view = View { learning_paths: 1 << 14, ..view(camera, Sampling::Adaptive, 4) };
-        Ok(mean(&render(setting, &builder.build(), &environment, view, 256)?))
+        Ok(mean(&render(setting, (&builder.build(), &environment), view, 256)?))
     };
     let off = difference(of(1.0)?, of(scale)?);
     let (world, camera) = sealed(scale);
-    let film = render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?;
+    let film = render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?;
     Ok(Outcome::default()
         .sound(&film)
         .at_most("against the room of 4 m: standard errors off", off, SIGMAS)
@@ -280,14 +281,14 @@ fn small_beside_large(setting: &Setting) -> Result<Outcome> {
         let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
         let high = Vec3::new(2.0, 2.5, 1.5) * scale;
         let world = ground(builder.faces(&lambert(0.8), low, high, [0])).build();
-        render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?
+        render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?
     };
     // The same scene at the room's usual size.
     let lit = |factor: f32| -> Result<Mean> {
         let (builder, camera) = room(0.8, factor, Vec3::ZERO);
         let floor = Vec3::new(0.0, -factor, 0.0);
         let world: World = builder.floor(&lambert(0.2), floor, 4e7 * factor).build();
-        Ok(mean(&render(setting, &world, &environment, view(camera, Sampling::Plain, 4), 256)?))
+        Ok(mean(&render(setting, (&world, &environment), view(camera, Sampling::Plain, 4), 256)?))
     };
     // Near zero the origins of rays are moved by 1.5e-5 m: a hundredth of this room, so its light may be
     // off by as much (1e-2 below). The sealed one must be dark all the same.

@@ -12,12 +12,11 @@ use super::scenes::{
     SIGMAS, constant, deviation, difference, lambert, learned, mean, render, room, sealed, sky,
     view,
 };
-use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::counters::{Counters, MAX_RECORDS_PER_PASS, MAX_WEIGHT, Tally, WEIGHT_ONE};
 use crate::light_grid::{LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
-use crate::path::{World, WorldBuilder};
+use crate::path::{Lit, World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
@@ -96,18 +95,12 @@ fn cells() -> Outcome {
 }
 
 /// Pictures by [`Sampling::Adaptive`] and [`Sampling::Talk`] against the plain sampler's.
-fn against_plain(
-    setting: &Setting,
-    world: &World,
-    environment: &Environment,
-    view: &View,
-    samples: u32,
-) -> Result<Outcome> {
+fn against_plain(setting: &Setting, lit: Lit<'_>, view: &View, samples: u32) -> Result<Outcome> {
     let plain = View { sampling: Sampling::Plain, seed: 77, ..view.clone() };
-    let expected = mean(&render(setting, world, environment, plain, 4 * samples)?);
+    let expected = mean(&render(setting, lit, plain, 4 * samples)?);
     let mut outcome = Outcome::default();
     for sampling in [Sampling::Adaptive, Sampling::Talk] {
-        let film = render(setting, world, environment, View { sampling, ..view.clone() }, samples)?;
+        let film = render(setting, lit, View { sampling, ..view.clone() }, samples)?;
         let off = difference(expected, mean(&film));
         let what = format!("{sampling:?} against plain: standard errors off");
         outcome = outcome.sound(&film).at_most(what, off, SIGMAS);
@@ -119,7 +112,7 @@ fn against_plain(
 
 fn in_the_room(setting: &Setting, scale: f32, center: Vec3, camera: Camera) -> Result<Outcome> {
     let world = room(0.7, scale, center).0.build();
-    against_plain(setting, &world, &sky("day")?, &view(camera, Sampling::Adaptive, 3), 128)
+    against_plain(setting, (&world, &sky("day")?), &view(camera, Sampling::Adaptive, 3), 128)
 }
 
 /// A camera in a closed box that stands in the room sees that box from inside, black.
@@ -141,7 +134,7 @@ fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     for sampling in [Sampling::Adaptive, Sampling::Talk] {
         let view = view(camera.clone(), sampling, 4);
-        let mut session = learned(setting, world, &environment, view)?;
+        let mut session = learned(setting, (world, &environment), view)?;
         session.advance(32, &AtomicBool::new(false))?;
         let (film, figures) = (session.film(), session.figures());
         outcome = outcome
@@ -189,7 +182,7 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
         }
     }
     let view = View { learning_paths: 1 << 16, ..view(camera, Sampling::Adaptive, 1) };
-    let film = render(setting, &world, &constant(1.0)?, view, setting.count(4096, 65_536))?;
+    let film = render(setting, (&world, &constant(1.0)?), view, setting.count(4096, 65_536))?;
     let found = mean(&film);
     let expected = irradiance / std::f64::consts::PI;
     Ok(Outcome::default()
@@ -208,38 +201,24 @@ fn empty_cells(setting: &Setting) -> Result<Outcome> {
     let (world, environment) = (builder.build(), sky("day")?);
     let eye: Vec3 = camera.world_from_camera.translation.into();
     let narrow = Camera::look_at(eye, Vec3::new(-1.0, 0.0, 1.0), 0.05);
-    let first = learned(setting, &world, &environment, view(narrow, Sampling::Adaptive, 1))?;
+    let first = learned(setting, (&world, &environment), view(narrow, Sampling::Adaptive, 1))?;
     let grid = first.grid().ok_or_else(|| Error::new("nothing was learned"))?.clone();
     let cells = grid.grid().map_or(0, SphericalGrid::cell_count);
     let empty = (0..cells).filter(|cell| grid.distribution_of_cell(*cell) == WHOLE_MAP).count();
-    let outcome = with_grids(setting, &world, &environment, &camera, &[grid])?;
+    let outcome = with_grid(setting, (&world, &environment), &camera, grid)?;
     Ok(outcome.at_least("share of empty cells", empty as f64 / f64::from(cells), 0.9))
 }
 
-/// Pictures with grids that were learned elsewhere, against the plain sampler's.
-fn with_grids(
-    setting: &Setting,
-    world: &World,
-    environment: &Environment,
-    camera: &Camera,
-    grids: &[LightGrid],
-) -> Result<Outcome> {
+/// A picture with a grid that was learned elsewhere, against the plain sampler's.
+fn with_grid(setting: &Setting, lit: Lit<'_>, camera: &Camera, grid: LightGrid) -> Result<Outcome> {
     let wanted = |sampling, seed| View { seed, ..view(camera.clone(), sampling, 2) };
-    let plain = render(setting, world, environment, wanted(Sampling::Plain, 5), 512)?;
-    let mut outcome = Outcome::default();
-    for (seed, grid) in (10..).zip(grids) {
-        let mut session =
-            super::scenes::session(setting, world, environment, wanted(Sampling::Adaptive, seed))?;
-        session.set_grid(grid.clone())?;
-        session.advance(128, &AtomicBool::new(false))?;
-        let off = difference(mean(&plain), mean(session.film()));
-        outcome = outcome.sound(session.film()).at_most(
-            "foreign grid against plain: standard errors off",
-            off,
-            SIGMAS,
-        );
-    }
-    Ok(outcome)
+    let plain = render(setting, lit, wanted(Sampling::Plain, 5), 512)?;
+    let mut session = super::scenes::session(setting, lit, wanted(Sampling::Adaptive, 10))?;
+    session.set_grid(grid)?;
+    session.advance(128, &AtomicBool::new(false))?;
+    let off = difference(mean(&plain), mean(session.film()));
+    let what = "foreign grid against plain: standard errors off";
+    Ok(Outcome::default().sound(session.film()).at_most(what, off, SIGMAS))
 }
 
 /// Ratios survive 2^32 hits in one cell, and no counter wraps.
@@ -292,26 +271,26 @@ fn moving_camera(setting: &Setting) -> Result<Outcome> {
         let eye = Vec3::new(1.5 - 0.9 * step as f32 % 3.0, 1.25, -1.0 + 0.7 * step as f32 % 2.0);
         let camera = Camera::look_at(eye, Vec3::new(-0.5, 0.75, -0.25), 1.0);
         if let Some(grid) = before.take() {
-            outcome = outcome.and(with_grids(setting, &world, &environment, &camera, &[grid])?);
+            outcome = outcome.and(with_grid(setting, (&world, &environment), &camera, grid)?);
         }
-        let first = learned(setting, &world, &environment, view(camera, Sampling::Adaptive, 2))?;
+        let first = learned(setting, (&world, &environment), view(camera, Sampling::Adaptive, 2))?;
         before = first.grid().cloned();
     }
     let grid = SphericalGrid { center: Vec3::Y, columns: 64, rows: 32, faces: true, medium: false };
     let garbage = LightGrid::with_garbage_distributions(grid, environment.tile_energies(), 9);
     let garbage = garbage.ok_or_else(|| Error::new("the sky is black"))?;
     let camera = room(0.7, 1.0, Vec3::ZERO).1;
-    Ok(outcome.and(with_grids(setting, &world, &environment, &camera, &[garbage])?))
+    Ok(outcome.and(with_grid(setting, (&world, &environment), &camera, garbage)?))
 }
 
 fn learning_paths(setting: &Setting, paths: u64) -> Result<Outcome> {
     let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { learning_paths: paths, ..view(camera, Sampling::Adaptive, 1) };
-    let mut session = learned(setting, &world, &environment, view.clone())?;
+    let mut session = learned(setting, (&world, &environment), view.clone())?;
     session.advance(64, &AtomicBool::new(false))?;
     let plain = View { sampling: Sampling::Plain, seed: 4, ..view };
-    let plain: Film = render(setting, &world, &environment, plain, 256)?;
+    let plain: Film = render(setting, (&world, &environment), plain, 256)?;
     let figures = session.figures();
     let budget = MEMORY_BUDGET_BYTES as f64;
     Ok(Outcome::default()

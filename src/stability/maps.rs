@@ -350,5 +350,5 @@ fn floor(
     let world = WorldBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 10.0).build();
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 1e-3);
     let view = View { width: 8, height: 8, ..view(camera, Sampling::Plain, 1) };
-    render(setting, &world, environment, view, samples)
+    render(setting, (&world, environment), view, samples)
 }

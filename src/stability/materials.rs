@@ -58,7 +58,7 @@ fn ball(material: &Material) -> (World, Camera) {
 /// A picture of a scene in uniform light of radiance 1.
 fn furnace(setting: &Setting, (world, camera): (World, Camera), bounces: u32) -> Result<Film> {
     let view = View { width: 12, height: 12, ..view(camera, Sampling::Plain, bounces) };
-    render(setting, &world, &constant(1.0)?, view, setting.count(32, 512))
+    render(setting, (&world, &constant(1.0)?), view, setting.count(32, 512))
 }
 
 /// The brightest and the darkest of several furnaces, beyond their noise.
@@ -128,7 +128,8 @@ fn white_room(setting: &Setting) -> Result<Outcome> {
     // The block has half the walls' albedo: make it white.
     let mut scene = world.scene;
     scene.materials.iter_mut().for_each(|m| m.base_color = Vec3::ONE.extend(1.0));
-    let film = render(setting, &World::new(scene), &constant(1.0)?, view, setting.count(32, 512))?;
+    let film =
+        render(setting, (&World::new(scene), &constant(1.0)?), view, setting.count(32, 512))?;
     let found = mean(&film);
     Ok(Outcome::default()
         .sound(&film)
@@ -228,7 +229,7 @@ fn media(setting: &Setting) -> Result<Outcome> {
                 medium: Some(fog),
                 ..view(camera.clone(), Sampling::Plain, 64)
             };
-            let film = render(setting, &world, &constant(1.0)?, view, setting.count(16, 512))?;
+            let film = render(setting, (&world, &constant(1.0)?), view, setting.count(16, 512))?;
             if scattering < 1e-3 {
                 thinnest = thinnest.max(deviation(mean(&film), 1.0, 1e-3));
             }
@@ -281,7 +282,7 @@ fn overflow(setting: &Setting) -> Result<Outcome> {
     let world = WorldBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();
     let environment = constant(f32::MAX)?;
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 0.3);
-    let mut session = learned(setting, &world, &environment, view(camera, Sampling::Plain, 2))?;
+    let mut session = learned(setting, (&world, &environment), view(camera, Sampling::Plain, 2))?;
     session.advance(16, &AtomicBool::new(false))?;
     let film = session.film();
     let odd = film.pixels().iter().filter(|p| !p.mean().iter().all(|c| c.is_finite())).count();

@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;
-use crate::path::{PathLimits, World, WorldBuilder};
+use crate::path::{Lit, PathLimits, World, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::UploadedScene;
@@ -105,24 +105,14 @@ pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
 }
 
 /// A session on the device under test, before its learning.
-pub(super) fn session<'a>(
-    setting: &Setting,
-    world: &'a World,
-    environment: &'a Environment,
-    view: View,
-) -> Result<Session<'a>> {
-    let upload = |gpu| UploadedScene::new(gpu, world, environment);
-    Session::on(world, environment, view, setting.gpu.as_ref().map(upload).transpose()?.as_ref())
+pub(super) fn session<'a>(setting: &Setting, lit: Lit<'a>, view: View) -> Result<Session<'a>> {
+    let upload = |gpu| UploadedScene::new(gpu, lit.0, lit.1);
+    Session::on(lit, view, setting.gpu.as_ref().map(upload).transpose()?.as_ref())
 }
 
 /// A session that has done its learning.
-pub(super) fn learned<'a>(
-    setting: &Setting,
-    world: &'a World,
-    environment: &'a Environment,
-    view: View,
-) -> Result<Session<'a>> {
-    let mut session = session(setting, world, environment, view)?;
+pub(super) fn learned<'a>(setting: &Setting, lit: Lit<'a>, view: View) -> Result<Session<'a>> {
+    let mut session = session(setting, lit, view)?;
     while session.phase() == Phase::Learning {
         session.advance(0, &AtomicBool::new(false))?;
     }
@@ -130,14 +120,8 @@ pub(super) fn learned<'a>(
 }
 
 /// Learns if the view asks for it, then renders.
-pub(super) fn render(
-    setting: &Setting,
-    world: &World,
-    environment: &Environment,
-    view: View,
-    samples: u32,
-) -> Result<Film> {
-    let mut session = learned(setting, world, environment, view)?;
+pub(super) fn render(setting: &Setting, lit: Lit<'_>, view: View, samples: u32) -> Result<Film> {
+    let mut session = learned(setting, lit, view)?;
     session.advance(samples, &AtomicBool::new(false))?;
     session.settle()?;
     Ok(session.film().clone())

@@ -38,7 +38,7 @@ fn on_gpu<'a>(
     gpu: &Gpu,
 ) -> Session<'a> {
     let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
-    Session::on(world, environment, view, Some(&uploaded)).expect("it fits")
+    Session::on((world, environment), view, Some(&uploaded)).expect("it fits")
 }
 
 /// Learns and renders pass by pass, as [`render`] does.
@@ -149,7 +149,7 @@ fn what_is_only_measured_is_for_the_cpu_alone() {
         (View { points: Points::Independent, ..view }, "independent points are for the CPU alone"),
         (squared, "learning by the squared cosine is for the CPU alone"),
     ] {
-        let refused = Session::on(&world, &environment, view, Some(&uploaded)).err();
+        let refused = Session::on((&world, &environment), view, Some(&uploaded)).err();
         assert_eq!(refused.expect("it is refused").to_string(), sentence);
     }
 }

@@ -130,7 +130,7 @@ fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
 }
 
 fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
-    let count = convergence.runs().len();
+    let count = convergence.runs.len();
     let mut lines: Vec<Line<'static>> = Vec::new();
     let mut add = |run: &Run, color: Color32, width: f32| {
         if run.points.len() > 1 {
@@ -148,12 +148,12 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
             }
         }
     };
-    for (i, run) in convergence.runs().iter().enumerate() {
+    for (i, run) in convergence.runs.iter().enumerate() {
         let is_current = i + 1 == count;
         let color = if is_current { theme::ACCENT } else { faded(run.number - 1) };
         add(run, color, if is_current { 2.0 } else { 1.2 });
     }
-    if let Some(run) = convergence.plain() {
+    if let Some(run) = &convergence.plain {
         add(run, theme::SECOND, 2.0);
     }
     lines

@@ -177,7 +177,7 @@ fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Sp
     let (scene, snapshot) = (scope.scene?, &scope.shown?.order.snapshot);
     let world = &snapshot.request.world;
     // The last picture of another scene says nothing about this one.
-    let is_of_scene = Arc::ptr_eq(world.geometry(), scene.world.geometry());
+    let is_of_scene = Arc::ptr_eq(&world.geometry, &scene.world.geometry);
     is_of_scene.then(|| look_at_place(world, &snapshot.view(), place))?
 }
 

@@ -32,7 +32,7 @@ pub(in crate::app) fn show(
     }
     let mut removed = None;
     // The newest is what was just kept.
-    for (i, kept) in history.list_mut().iter_mut().enumerate().rev() {
+    for (i, kept) in history.list.iter_mut().enumerate().rev() {
         ui.horizontal(|ui| {
             if small(ui, kept).clicked() {
                 chosen.left = (chosen.left != Some(i)).then_some(i);

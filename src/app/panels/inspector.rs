@@ -260,8 +260,8 @@ fn cell(
         }));
     }
     ui.horizontal(|ui| {
-        let label = if inspector.is_busy() { "Measuring…" } else { "Measure the truth" };
-        let button = ui.add_enabled(!inspector.is_busy(), egui::Button::new(label));
+        let label = if inspector.busy { "Measuring…" } else { "Measure the truth" };
+        let button = ui.add_enabled(!inspector.busy, egui::Button::new(label));
         let hint = "Ground truth by 256 shadow rays to every tile from this point";
         if button.on_hover_text(hint).clicked() {
             if interface.pinned.is_none() {

@@ -277,7 +277,7 @@ fn picture(
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
     let request = &shown.order.snapshot.request;
-    let of = (Arc::clone(request.world.geometry()), request.view.camera.clone());
+    let of = (Arc::clone(&request.world.geometry), request.view.camera.clone());
     if request.view.crop.is_none() {
         scope.textures.main_of = (!shown.order.covers_now()).then_some(of);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
@@ -316,7 +316,7 @@ fn has_squares(picture: &LinearPicture, shown: &Shown, scope: &Scope<'_>) -> boo
 fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
     let is_idle =
         |snapshot: &Snapshot| matches!(snapshot.activity, Activity::Paused | Activity::Done);
-    let changes = picture.is_live()
+    let changes = picture.is_live
         && !scope.screen.gpu().facts().is_software()
         && !scope.snapshot.is_none_or(is_idle);
     if changes {

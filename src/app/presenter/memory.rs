@@ -134,7 +134,7 @@ impl Memory {
         if order.snapshot.request.view.crop.is_none() {
             self.whole = order.metered.map(|white_balance| Metered {
                 environment: Arc::clone(&order.snapshot.request.environment),
-                geometry: Arc::clone(order.snapshot.request.world.geometry()),
+                geometry: Arc::clone(&order.snapshot.request.world.geometry),
                 white_balance,
                 ev: automatic_ev,
             });
@@ -198,7 +198,7 @@ impl Memory {
         let (request, whole) = (&order.snapshot.request, self.whole.as_ref()?);
         request.view.crop?;
         let is_alike = whole.environment.shares_map_with(&request.environment)
-            && Arc::ptr_eq(&whole.geometry, request.world.geometry())
+            && Arc::ptr_eq(&whole.geometry, &request.world.geometry)
             && Some(whole.white_balance) == order.metered;
         is_alike.then_some(whole.ev)
     }

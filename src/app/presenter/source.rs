@@ -210,7 +210,7 @@ pub(super) mod tests {
             let session = session.clone();
             let source = Source { session, backdrop: None, denoiser, is_whole: true };
             let prepared = source.prepare(developer, &AtomicBool::new(false));
-            prepared.expect("not cancelled").picture.is_live()
+            prepared.expect("not cancelled").picture.is_live
         };
         assert!(!is_live(&developer, &session, None));
         let uploaded = developer.upload_film(&session.film, true);

@@ -64,7 +64,7 @@ impl Device {
     /// Chooses the device that the request names, which may be none but the CPU. A GPU that failed with
     /// something else, for which it may have been too small, is chosen again.
     pub(super) fn choose_for(&mut self, request: &Request) {
-        let geometry = Arc::downgrade(request.world.geometry());
+        let geometry = Arc::downgrade(&request.world.geometry);
         let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.ptr_eq(&geometry));
         // A real one is what both choices of a GPU mean.
         let is_meant = request.device != DeviceChoice::Cpu && self.has_real_gpu();
@@ -154,7 +154,7 @@ impl Device {
     pub(super) fn give_up(&mut self, failure: &Error, request: &Request) {
         self.tell(failure);
         (self.gpu, self.uploaded, self.awaited) = (None, None, None);
-        self.refused = Some(Arc::downgrade(request.world.geometry()));
+        self.refused = Some(Arc::downgrade(&request.world.geometry));
     }
 
     fn tell(&mut self, failure: &Error) {

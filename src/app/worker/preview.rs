@@ -37,7 +37,7 @@ pub(super) struct Preview {
     /// Copies that somebody still has.
     lent: Vec<Weak<Film>>,
     /// Whether the window wants no new copy for now.
-    rests: bool,
+    pub(super) rests: bool,
 }
 
 /// A session's picture as it was when its film was copied or, where it is shown in place, read back.
@@ -60,11 +60,6 @@ impl Preview {
     /// picture that `is_final` is always copied.
     pub(super) fn prepare(&mut self, is_final: bool, is_throttled: bool) {
         self.rests = !is_final && (is_throttled || self.is_ahead());
-    }
-
-    /// Whether the window rests, and gets no new copies.
-    pub(super) fn rests(&self) -> bool {
-        self.rests
     }
 
     /// Whether those who show films have one that they have not come to yet: a third would only take memory.

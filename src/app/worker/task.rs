@@ -183,8 +183,8 @@ impl<'a> PictureTask<'a> {
         if let Some(left) = self.sessions.kept.come_back(&request) {
             (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
             self.inspection.curves[MAIN] = left.curve;
-            let (world, environment) = (self.sessions.world, self.sessions.environment);
-            let resume = |state| Session::resume(world, environment, state);
+            let lit = (self.sessions.world, self.sessions.environment);
+            let resume = |state| Session::resume(lit, state);
             let cached = left.cached.map(|cached| {
                 let mut cached = cached.map(resume);
                 self.sessions.take_up_training(&mut cached.session);
@@ -453,7 +453,7 @@ impl<'a> PictureTask<'a> {
             request,
         });
         self.published = Instant::now();
-        if !self.preview.rests() {
+        if !self.preview.rests {
             let cost = (self.published - start).saturating_sub(reading);
             self.publish_gap = gap_after(cost);
         }
@@ -463,7 +463,7 @@ impl<'a> PictureTask<'a> {
         if request.moving || samples == 0 {
             return None;
         }
-        let notice = || cut_off_notice(&request.world, &request.environment, &request.view);
+        let notice = || cut_off_notice((&request.world, &request.environment), &request.view);
         self.cut_off.get_or_init(|| notice().map(Arc::from)).clone()
     }
 

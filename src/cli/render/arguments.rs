@@ -98,7 +98,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_parser = values::region, allow_hyphen_values = true, value_name = "X,Y,W,H", help_heading = "Picture")]
     pub(super) region: Option<[u32; 4]>,
     /// Pixel filter.
-    #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
+    #[arg(long, default_value = "blackman-harris", help_heading = "Picture")]
     pub(super) filter: PixelFilter,
     #[command(flatten)]
     pub(super) picture: PictureArguments,
@@ -116,31 +116,19 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) noise: Option<f64>,
 
     /// How the map is sampled.
-    #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
+    #[arg(long, default_value = "adaptive", help_heading = "Light")]
     pub(in crate::cli) sampling: Sampling,
     /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
     /// each pixel, but coarser. `auto` shares with adaptive sampling, from 64x64 pixels on that are not
     /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
-    #[arg(
-        long,
-        default_value = "auto",
-        value_enum,
-        value_name = "off|4x4|8x8|auto",
-        help_heading = "Light"
-    )]
+    #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto", help_heading = "Light")]
     pub(super) sharing: Sharing,
     /// What becomes of light that has met several surfaces. Unless it is given: exact, with up to 16 samples of
     /// cached light beside it where a picture of a room is denoised, for as long as its own are few.
-    #[arg(long, value_enum, value_name = "exact|cached", help_heading = "Light")]
+    #[arg(long, value_name = "exact|cached", help_heading = "Light")]
     pub(super) gi: Option<Gi>,
     /// Importance table of the map; all but tile-local are for the CPU alone.
-    #[arg(
-        long,
-        default_value = "tile-local",
-        value_enum,
-        value_name = "KIND",
-        help_heading = "Light"
-    )]
+    #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
     pub(super) table: TableKind,
     /// Vertices, on surfaces and in fog, at which a path gathers light; 1 is direct light only, 0 lamps
     /// and the map alone.
@@ -164,17 +152,17 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "0", value_parser = values::whole::<u32>(0..=u32::MAX), value_name = "N", help_heading = "Run")]
     pub(super) seed: u32,
     /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
-    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    #[arg(long, default_value = "auto", help_heading = "Run")]
     pub(in crate::cli) device: DeviceChoice,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME", help_heading = "Run")]
     pub(in crate::cli) adapter: Option<String>,
     /// What finds the surfaces that rays hit on a GPU.
-    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    #[arg(long, default_value = "auto", help_heading = "Run")]
     pub(in crate::cli) rays: RayChoice,
     /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the GPU.
     /// The picture is the same. Where pixels share vertices, kernels always take turns.
-    #[arg(long, value_enum, help_heading = "Run")]
+    #[arg(long, help_heading = "Run")]
     pub(super) schedule: Option<Schedule>,
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = values::whole::<u16>(0..=1024), value_name = "N", help_heading = "Run")]
@@ -271,18 +259,18 @@ impl RenderArguments {
     /// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
     pub(super) fn sharing(&self) -> Sharing {
         match self.sharing {
-            Sharing::Auto if self.picture.is_denoised(self.pictures()) => Sharing::Off,
+            Sharing::Auto if self.picture.is_denoised(&self.pictures()) => Sharing::Off,
             asked => asked,
         }
     }
 
     /// Whether albedo, normal and depth are to be found.
     pub(super) fn wants_surfaces(&self) -> bool {
-        self.background == Some(Background::None) || self.picture.wants_surfaces(self.pictures())
+        self.background == Some(Background::None) || self.picture.wants_surfaces(&self.pictures())
     }
 
-    pub(super) fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
-        self.outputs.iter().chain(&self.frame_of_video)
+    pub(super) fn pictures(&self) -> Vec<PathBuf> {
+        self.outputs.iter().chain(&self.frame_of_video).cloned().collect()
     }
 
     /// Width and height of what is rendered.

@@ -4,10 +4,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::RenderArguments;
-use crate::environment::Environment;
 use crate::error::Result;
 use crate::memory;
-use crate::path::World;
+use crate::path::Lit;
 use crate::render::cached_picture::{CachedPicture, suits};
 use crate::render::film::Film;
 use crate::render::{Driver, Sampling, Session, StopRule, View};
@@ -18,8 +17,7 @@ const MIN_SIZE: u32 = 64;
 
 /// The picture by cached light, where it helps to denoise.
 pub(super) struct Beside<'a> {
-    world: &'a World,
-    environment: &'a Environment,
+    lit: Lit<'a>,
     is_wanted: bool,
     /// Whether exact samples are wanted for themselves. Else what was asked for is the number of both together.
     wants_exact: bool,
@@ -34,8 +32,7 @@ impl<'a> Beside<'a> {
     /// there is no memory for another film of `film_bytes`.
     pub(super) fn new(
         arguments: &RenderArguments,
-        world: &'a World,
-        environment: &'a Environment,
+        lit: Lit<'a>,
         view: &View,
         film_bytes: u64,
     ) -> Self {
@@ -46,15 +43,14 @@ impl<'a> Beside<'a> {
             && is_one
             && view.sampling == Sampling::Adaptive
             && view.width.min(view.height) >= MIN_SIZE
-            && arguments.picture.is_denoised(arguments.pictures())
-            && suits(world, view)
+            && arguments.picture.is_denoised(&arguments.pictures())
+            && suits(lit.0, view)
             && memory::check(film_bytes).is_ok();
         Self {
-            world,
-            environment,
+            lit,
             is_wanted,
             wants_exact: arguments.noise.is_some()
-                || arguments.picture.shows_rendered(arguments.pictures()),
+                || arguments.picture.shows_rendered(&arguments.pictures()),
             picture: None,
             seconds: 0.0,
             asked: arguments.stop_rule(),
@@ -80,7 +76,7 @@ impl<'a> Beside<'a> {
         let start = Instant::now();
         let picture = match &mut self.picture {
             Some(picture) => picture,
-            None => self.picture.insert(CachedPicture::beside(main, self.world, self.environment)?),
+            None => self.picture.insert(CachedPicture::beside(main, self.lit)?),
         };
         let Some(session) = picture.next(main, 0, self.wants_exact) else { return Ok(false) };
         session.advance(1, cancel)?;

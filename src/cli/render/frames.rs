@@ -10,7 +10,7 @@ use glam::{Affine3A, Vec3};
 
 use super::RenderArguments;
 use crate::cli::picture::say_written;
-use crate::error::{Error, Result};
+use crate::error::{At as _, Error, Result};
 use crate::image::{extension, name_of_process, write_beside_and_rename};
 use crate::path::{World, framing};
 use crate::scene::Camera;
@@ -160,7 +160,7 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
             ));
         }
         if let Some(codec) = codec(path) {
-            try_ffmpeg(codec).map_err(|cause| Error::at(path, cause))?;
+            try_ffmpeg(codec).at(path)?;
         }
         if has_number && path.file_name().is_some_and(|name| name.to_str().is_none()) {
             return Err(Error::at(path, "its name is not Unicode: no number can be put into it"));
@@ -201,7 +201,8 @@ fn said(text: &[u8]) -> String {
 
 /// A folder for the frames of a video, gone when this value is.
 pub(super) struct Reel {
-    folder: PathBuf,
+    /// Where they are.
+    pub(super) folder: PathBuf,
     /// Frames asked for so far.
     count: u32,
 }
@@ -213,13 +214,8 @@ impl Reel {
     /// If it cannot be made.
     pub(super) fn new() -> Result<Self> {
         let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", name_of_process()));
-        fs::create_dir(&folder).map_err(|error| Error::at(&folder, error))?;
+        fs::create_dir(&folder).at(&folder)?;
         Ok(Self { folder, count: 0 })
-    }
-
-    /// Where they are.
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// Where the next frame is to be written: in the place of the last if that could not be, for videos are

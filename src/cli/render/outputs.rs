@@ -96,8 +96,8 @@ pub(super) fn write(
 ) -> Vec<Error> {
     let films = Films { film: record.film, cached, denoised: None };
     let metadata = record.metadata();
-    let pictures = arguments.pictures().filter(|_| arguments.part.is_none());
-    let denoised = arguments.picture.denoised(pictures, films);
+    let of_pictures = || arguments.picture.denoised(&arguments.pictures(), films);
+    let denoised = arguments.part.is_none().then(of_pictures).flatten();
     let films = Films { denoised: denoised.as_ref(), ..films };
     let write = |path: &PathBuf| match arguments.part {
         Some(_) => assignment.write_part(path, driver, record),

@@ -12,11 +12,10 @@ use crate::alarm::Alarm;
 use crate::cli::device::say;
 use crate::cli::interrupt::Interrupt;
 use crate::digest::Digest;
-use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
 use crate::output::record::Record;
-use crate::path::{PathLimits, World};
+use crate::path::{Lit, PathLimits};
 use crate::render::film::Film;
 use crate::render::{
     Awaited, Doubling, Driver, Figures, Gi, SAMPLES_VERSION, Session, StopRule, View,
@@ -56,12 +55,7 @@ impl RenderJob {
     ///
     /// # Errors
     /// If there is a checkpoint that is of another picture or cannot be read, or a part has no samples.
-    pub(super) fn open(
-        arguments: &RenderArguments,
-        rule: StopRule,
-        (world, environment): (&World, &Environment),
-        view: &View,
-    ) -> Result<Self> {
+    pub(super) fn open(arguments: &RenderArguments, lit: Lit<'_>, view: &View) -> Result<Self> {
         let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
         if is_kept && arguments.gi == Some(Gi::Cached) {
             return Err(Error::new(
@@ -69,7 +63,7 @@ impl RenderJob {
                  they want --gi exact",
             ));
         }
-        let part = arguments.part.unwrap_or(Part::WHOLE);
+        let (part, rule) = (arguments.part.unwrap_or(Part::WHOLE), arguments.stop_rule());
         let range = part.range(rule.samples.unwrap_or(0));
         if arguments.part.is_some() && range.is_empty() {
             let samples = rule.samples.unwrap_or(0);
@@ -89,7 +83,7 @@ impl RenderJob {
             wants_distributions: arguments.distributions.is_some(),
             // It takes a look at all of the scene and the map.
             picture: match is_kept {
-                true => identity(arguments, world, environment, view),
+                true => identity(arguments, lit, view),
                 false => Vec::new(),
             },
             metadata: Vec::new(),
@@ -189,7 +183,7 @@ impl RenderJob {
         if driver.has_samples() {
             interrupt.keep();
         }
-        driver.step(interrupt.asked())
+        driver.step(&interrupt.asked)
     }
 
     /// Writes the checkpoint if it is time, and has the next pass cut short when it will be so again or
@@ -275,12 +269,8 @@ impl RenderJob {
 }
 
 /// What a picture's samples depend on, by names for sentences.
-fn identity(
-    arguments: &RenderArguments,
-    world: &World,
-    environment: &Environment,
-    view: &View,
-) -> Vec<(String, String)> {
+fn identity(arguments: &RenderArguments, lit: Lit<'_>, view: &View) -> Vec<(String, String)> {
+    let (world, environment) = lit;
     let (scene, map) = (&arguments.scene, arguments.map());
     let scene = match sources::is_built_in_scene(scene) {
         true => {

@@ -6,6 +6,7 @@ use wgpu::{
     BlasTriangleGeometry, BlasTriangleGeometrySizeDescriptor, BufferUsages,
 };
 
+use super::buffer::buffer;
 use super::buffers::PIECE_BYTES;
 use super::device::Gpu;
 use super::layout::material_flags::{ALPHA_MASK, BACKED, CLEAR_SOLID, PARTIAL};
@@ -167,14 +168,8 @@ fn input(gpu: &Gpu, name: &str, contents: &[u8]) -> Result<wgpu::Buffer> {
             gpu.limits.max_buffer_size >> 20
         )));
     }
-    let buffer = gpu.make(|device| {
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name),
-            size,
-            usage: BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    })?;
+    let usage = BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST;
+    let buffer = gpu.make(|device| buffer(device, Some(name), size, usage))?;
     let offsets = (0..).step_by(PIECE_BYTES);
     for (offset, piece) in offsets.zip(contents.chunks(PIECE_BYTES)) {
         gpu.queue.write_buffer(&buffer, offset, piece);

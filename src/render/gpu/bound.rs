@@ -27,7 +27,7 @@ impl Bound {
         gpu: &Gpu,
         buffers: &Buffers,
     ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
-        let version = buffers.version();
+        let version = buffers.version;
         let kept = self.bind_group.take().filter(|(of, _)| *of == version);
         let current = match kept {
             Some(kept) => kept,

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+use wgpu::{Buffer, BufferUsages};
 
+use super::buffer::buffer;
 use super::device::Gpu;
 use super::shader::{ARRAYS, ArrayKind, ArrayPlaces, TexelFormat};
 use crate::error::{Error, Result};
@@ -23,7 +24,8 @@ pub(super) struct Buffers {
     pub(super) tree: Option<wgpu::Tlas>,
     /// Texels of a row of every array, as a power of two.
     width_log2: u32,
-    version: u64,
+    /// Changes whenever another buffer or array takes the place of one.
+    pub(super) version: u64,
     staging: Arc<Mutex<Option<Buffer>>>,
     bytes_read: Arc<AtomicU64>,
 }
@@ -40,7 +42,7 @@ impl Buffers {
         Self {
             gpu: gpu.clone(),
             by_name: BTreeMap::new(),
-            prefers_buffers: gpu.prefers_buffers(),
+            prefers_buffers: gpu.prefers_buffers,
             arrays: BTreeMap::new(),
             tree: None,
             width_log2,
@@ -278,11 +280,6 @@ impl Buffers {
         self.bytes_read.load(Ordering::Relaxed)
     }
 
-    /// Changes whenever another buffer or array takes the place of one.
-    pub(super) fn version(&self) -> u64 {
-        self.version
-    }
-
     fn most_bytes(&self) -> u64 {
         let limits = &self.gpu.limits;
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) & !0xf
@@ -307,12 +304,8 @@ fn for_want_of(bytes: u64, what: &str, error: &Error) -> Error {
 }
 
 fn create(device: &wgpu::Device, name: &str, bytes: u64) -> Buffer {
-    device.create_buffer(&BufferDescriptor {
-        label: Some(name),
-        size: bytes.next_multiple_of(16).max(16),
-        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    })
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+    buffer(device, Some(name), bytes.next_multiple_of(16).max(16), usage)
 }
 
 fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {

@@ -9,9 +9,8 @@ use super::layout::Work;
 use super::progress::{GROUP, MAX_GROUPS};
 use super::uploaded_scene::UploadedScene;
 use crate::bvh::Ray;
-use crate::environment::Environment;
 use crate::error::Result;
-use crate::path::World;
+use crate::path::Lit;
 use crate::render::View;
 use crate::render::gpu_facts::Question;
 
@@ -42,11 +41,7 @@ impl Caster {
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
-    pub(crate) fn new(
-        uploaded: &UploadedScene,
-        lit: (&World, &Environment),
-        view: &View,
-    ) -> Result<Self> {
+    pub(crate) fn new(uploaded: &UploadedScene, lit: Lit<'_>, view: &View) -> Result<Self> {
         Dispatcher::new(uploaded, lit, view, &view.rays()).map(Self)
     }
 
@@ -94,7 +89,8 @@ impl Caster {
 mod tests {
     use super::super::{Gpu, RayChoice};
     use super::*;
-    use crate::environment::EnvironmentOptions;
+    use crate::environment::{Environment, EnvironmentOptions};
+    use crate::path::World;
     use crate::render::Sampling;
     use crate::render::gpu::parity::fixture;
     use crate::sampler::Sampler;

@@ -107,7 +107,7 @@ pub struct Gpu {
     hardware_rays: bool,
     pub(super) kernels: Arc<Mutex<KernelCache>>,
     /// Whether read-only arrays lie in storage buffers.
-    prefers_buffers: bool,
+    pub(super) prefers_buffers: bool,
     /// How kernels share the work, whatever suits it.
     pub(super) schedule: Option<Schedule>,
 }
@@ -256,12 +256,6 @@ impl Gpu {
             schedule: None,
         };
         gpu.with_rays(RayChoice::Auto)
-    }
-
-    /// Whether read-only arrays are to lie in storage buffers, which GPUs read faster than textures;
-    /// software Vulkan reads texels faster.
-    pub(super) fn prefers_buffers(&self) -> bool {
-        self.prefers_buffers
     }
 
     /// The same device with read-only arrays in storage buffers, whatever it prefers.

@@ -21,7 +21,7 @@ use super::uploaded_scene::{UploadedScene, put_array};
 use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::World;
+use crate::path::Lit;
 use crate::path::camera::CameraRays;
 use crate::scene::needs::SceneFeatures;
 
@@ -52,7 +52,7 @@ impl Dispatcher {
     /// If something does not fit on the device, with the numbers.
     pub(super) fn new(
         uploaded: &UploadedScene,
-        (world, environment): (&World, &Environment),
+        (world, environment): Lit<'_>,
         view: &View,
         rays: &CameraRays,
     ) -> Result<Self> {

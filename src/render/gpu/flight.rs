@@ -4,8 +4,9 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+use wgpu::{Buffer, BufferUsages};
 
+use super::buffer::buffer;
 use super::device::Gpu;
 use super::kernel::Kernel;
 use super::pacer::{LastUnits, Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
@@ -237,18 +238,15 @@ impl Clock {
             return None;
         }
         let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
+        let bytes = SLOT_BYTES * MAX_IN_FLIGHT as u64;
+        let usage = BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC;
         Some(Self {
             queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
                 count: 2 * MAX_IN_FLIGHT as u32,
             }),
-            resolved: gpu.device.create_buffer(&BufferDescriptor {
-                label: Some("timestamps"),
-                size: SLOT_BYTES * MAX_IN_FLIGHT as u64,
-                usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            }),
+            resolved: buffer(&gpu.device, Some("timestamps"), bytes, usage),
             staging: std::array::from_fn(|_| gpu.staging(16)),
             seconds_per_tick,
         })

@@ -290,7 +290,7 @@ pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32>
         globals.distribution_of_cell_at = push(&mut pairs(distribution_of_cell));
         globals.set_cells(cells);
     }
-    globals.whole_map_share = grid.whole_map_share();
+    globals.whole_map_share = grid.whole_map_share;
     globals.words_per_distribution = distributions.words_per_distribution;
     words
 }

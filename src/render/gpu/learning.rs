@@ -159,7 +159,7 @@ pub(super) mod tests {
                     .expect("done")
                 }
                 (None, paths) => {
-                    let tracer = view.tracer(&world, &environment, distributions.as_ref());
+                    let tracer = view.tracer((&world, &environment), distributions.as_ref());
                     let tracer = PathTracer { counts: Some(&learning), ..tracer };
                     match (paths, rendered) {
                         (Some(paths), _) => cpu::learn(&tracer, &rays, &view, paths, &never),
@@ -209,10 +209,10 @@ pub(super) mod tests {
         let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let training =
-            || CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
+            || CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
         let distributions = LightGrid::whole_map(environment.tile_energies());
         let (on_cpu, on_gpu) = (training(), training());
-        let tracer = view.tracer(&world, &environment, distributions.as_ref());
+        let tracer = view.tracer((&world, &environment), distributions.as_ref());
         let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
         let mut renderer =
             Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true)

@@ -8,6 +8,7 @@ mod acceleration;
 #[cfg(feature = "window")]
 mod background_compile;
 mod bound;
+mod buffer;
 mod buffers;
 mod cast;
 pub(crate) mod constants;
@@ -44,10 +45,9 @@ use glam::Vec3;
 
 use super::film::Film;
 use super::{Pass, View};
-use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::World;
+use crate::path::Lit;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 #[cfg(feature = "window")]
@@ -68,6 +68,7 @@ pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
     AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
+pub(crate) use buffer::buffer;
 pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
@@ -132,7 +133,7 @@ impl Renderer {
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(
         uploaded: &UploadedScene,
-        lit: (&World, &Environment),
+        lit: Lit<'_>,
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
@@ -152,7 +153,7 @@ impl Renderer {
     #[cfg(feature = "window")]
     pub(crate) fn new_or_held(
         uploaded: &UploadedScene,
-        lit: (&World, &Environment),
+        lit: Lit<'_>,
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
@@ -177,7 +178,7 @@ impl Renderer {
     #[cfg(test)]
     fn with_kernel(
         uploaded: &UploadedScene,
-        lit: (&World, &Environment),
+        lit: Lit<'_>,
         view: &View,
         rays: &CameraRays,
         compile: impl FnOnce(&Gpu, shader::Program) -> Result<Arc<kernel_cache::Pipeline>>,
@@ -192,7 +193,7 @@ impl Renderer {
     /// All but its kernels.
     fn without_kernels(
         uploaded: &UploadedScene,
-        lit: (&World, &Environment),
+        lit: Lit<'_>,
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
@@ -378,8 +379,9 @@ pub(super) mod tests {
     use std::sync::atomic::Ordering;
 
     use super::*;
-    use crate::environment::EnvironmentOptions;
+    use crate::environment::{Environment, EnvironmentOptions};
     use crate::light_grid::DistributionOptions;
+    use crate::path::World;
     use crate::render::Sampling;
     use crate::render::gi::tests::view;
     use crate::scene::builtin;

@@ -3,6 +3,7 @@
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
+use super::buffer::buffer;
 use super::device::Gpu;
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
@@ -53,12 +54,8 @@ impl Gpu {
 
     /// A buffer of so many bytes for [`Self::read_staged`].
     pub(crate) fn staging(&self, bytes: u64) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        buffer(&self.device, Some("staging"), bytes, usage)
     }
 
     /// Hands the first `bytes` bytes of a staging buffer to `take` after `commands`, which are submitted.

@@ -6,8 +6,8 @@ use std::time::Instant;
 use crate::environment::Environment;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, RenderedPaths};
-use crate::path::World;
 use crate::path::camera::CameraRays;
+use crate::path::{Lit, World};
 use crate::render::view_probe::{ROOM_ENCLOSURE, enclosure, middle_distance};
 use crate::render::{Figures, Sampling, View, cpu};
 
@@ -58,8 +58,7 @@ const MAX_MOVED: f32 = 0.5;
 impl Learning {
     /// An empty grid, if the view is to learn and the map has anything to learn about.
     pub(super) fn new(
-        world: &World,
-        environment: &Environment,
+        (world, environment): Lit<'_>,
         view: &View,
         rays: &CameraRays,
     ) -> Option<Self> {
@@ -95,15 +94,11 @@ fn counts_rendered(world: &World, view: &View) -> bool {
 
 impl Tiles {
     /// Nothing learned yet.
-    pub(super) fn new(
-        world: &World,
-        environment: &Environment,
-        view: &View,
-        rays: &CameraRays,
-    ) -> Self {
+    pub(super) fn new(lit: Lit<'_>, view: &View, rays: &CameraRays) -> Self {
+        let (_, environment) = lit;
         let is_sampled = view.sampling != Sampling::Bsdf && !environment.is_black();
         let whole_map = is_sampled.then(|| LightGrid::whole_map(environment.tile_energies()));
-        let learning = Learning::new(world, environment, view, rays);
+        let learning = Learning::new(lit, view, rays);
         Self { whole_map: whole_map.flatten(), learned: None, learning }
     }
 
@@ -332,7 +327,7 @@ mod tests {
         let rule = StopRule { samples: Some(16), ..StopRule::default() };
         // Seconds a pass while there are fewer than three samples, and then.
         let films = [[1e-3, 1e-3], [1e3, 1e-3], [1e3, 1e3]].map(|seconds| {
-            let session = Session::on(&world, &environment, view.clone(), Some(&uploaded));
+            let session = Session::on((&world, &environment), view.clone(), Some(&uploaded));
             let mut session = session.expect("it fits");
             while !rule.is_met(&session) {
                 let seconds = seconds[usize::from(session.samples() > 2)];

@@ -30,7 +30,7 @@ use super::{Figures, Phase, View, cpu, gpu};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::World;
+use crate::path::{Lit, World};
 use crate::sampler::Sequence;
 
 /// A GPU's film is read at least this often: so much work is lost with a device.
@@ -49,8 +49,8 @@ impl<'a> Session<'a> {
     pub fn new(world: &'a World, environment: &'a Environment, mut view: View) -> Self {
         view.sharing = view.sharing.decided(world, &view);
         let rays = view.rays();
-        let tiles = Tiles::new(world, environment, &view, &rays);
-        let training = CacheTraining::new(world, environment, &view, &rays);
+        let tiles = Tiles::new((world, environment), &view, &rays);
+        let training = CacheTraining::new((world, environment), &view, &rays);
         let state = SessionState {
             view,
             rays,
@@ -71,13 +71,8 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// If it does not fit on the device.
-    pub fn on(
-        world: &'a World,
-        environment: &'a Environment,
-        view: View,
-        uploaded: Option<&gpu::UploadedScene>,
-    ) -> Result<Self> {
-        let mut session = Self::new(world, environment, view);
+    pub fn on(lit: Lit<'a>, view: View, uploaded: Option<&gpu::UploadedScene>) -> Result<Self> {
+        let mut session = Self::new(lit.0, lit.1, view);
         if let Some(uploaded) = uploaded {
             session.continue_on_gpu(uploaded)?;
         }
@@ -382,16 +377,16 @@ impl<'a> Session<'a> {
 
     /// One learning pass.
     fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
-        let (world, environment) = (self.world, self.environment);
+        let lit = (self.world, self.environment);
         let state = &mut self.state;
         let Some((range, counted)) = state.tiles.next_pass(&state.view) else { return Ok(()) };
         let rays = match &mut self.gpu {
             None => {
-                let tracer = state.tracer(world, environment, Some(counted));
+                let tracer = state.tracer(lit, Some(counted));
                 let rays = cpu::learn(&tracer, &state.rays, &state.view, range.clone(), cancel);
                 if cancel.load(Ordering::Relaxed) {
                     let SessionState { view, rays, figures, .. } = state;
-                    state.tiles.begin_again(Learning::new(world, environment, view, rays), figures);
+                    state.tiles.begin_again(Learning::new(lit, view, rays), figures);
                     return self.take_up_distributions();
                 }
                 rays
@@ -402,7 +397,7 @@ impl<'a> Session<'a> {
             },
         };
         state.figures.learning_rays += rays;
-        state.tiles.note_traced(range.end, environment, &mut state.figures);
+        state.tiles.note_traced(range.end, self.environment, &mut state.figures);
         if range.end >= state.view.learning_paths {
             self.finish_learning();
         }
@@ -420,15 +415,11 @@ impl<'a> Session<'a> {
     /// Goes on, on the CPU, with what was put aside, in the same world under the same map. A radiance cache that was
     /// [taken](Self::take_training) is trained anew.
     #[cfg(feature = "window")]
-    pub(crate) fn resume(
-        world: &'a World,
-        environment: &'a Environment,
-        mut state: SessionState,
-    ) -> Self {
+    pub(crate) fn resume(lit: Lit<'a>, mut state: SessionState) -> Self {
         if state.training.is_none() {
-            state.training = CacheTraining::new(world, environment, &state.view, &state.rays);
+            state.training = CacheTraining::new(lit, &state.view, &state.rays);
         }
-        Self { world, environment, gpu: None, state }
+        Self { world: lit.0, environment: lit.1, gpu: None, state }
     }
 
     /// Trains the radiance cache, if there is one, as far as it is to be before the next pass, which is about
@@ -447,7 +438,7 @@ impl<'a> Session<'a> {
                 None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
                     let rays = cpu::train(
-                        &self.state.tracer(self.world, self.environment, None),
+                        &self.state.tracer((self.world, self.environment), None),
                         &self.state.rays,
                         &self.state.view,
                         paths.clone(),
@@ -473,7 +464,7 @@ impl<'a> Session<'a> {
     /// work.
     fn take_up_distributions(&mut self) -> Result<()> {
         let grid = self.state.tiles.grid();
-        let generation = grid.map_or(0, LightGrid::generation);
+        let generation = grid.map_or(0, |grid| grid.generation);
         if generation != self.state.sequence.generation {
             // Pixels that are ahead begin later in it.
             self.state.sequence = Sequence { generation, first_sample: self.state.samples };
@@ -501,7 +492,8 @@ impl<'a> Session<'a> {
         let samples = match &mut self.gpu {
             None => {
                 let mut film = state.film.take(&state.view);
-                let tracer = state.tracer(self.world, self.environment, state.tiles.counted_into());
+                let tracer =
+                    state.tracer((self.world, self.environment), state.tiles.counted_into());
                 let (samples, rays) =
                     cpu::render(&tracer, &state.rays, &state.view, pass, &mut film, cancel);
                 state.samples = film.min_samples();

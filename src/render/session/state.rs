@@ -4,10 +4,9 @@
 use super::host_film::HostFilm;
 use super::learning::Tiles;
 use super::noise::Noise;
-use crate::environment::Environment;
 use crate::light_grid::LearningGrid;
 use crate::path::camera::CameraRays;
-use crate::path::{PathTracer, World};
+use crate::path::{Lit, PathTracer};
 #[cfg(feature = "window")]
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
@@ -45,12 +44,11 @@ impl SessionState {
     /// What follows paths by the distributions in use, and counts them into `counts`.
     pub(super) fn tracer<'b>(
         &'b self,
-        world: &'b World,
-        environment: &'b Environment,
+        lit: Lit<'b>,
         counts: Option<&'b LearningGrid>,
     ) -> PathTracer<'b> {
         let cache = self.training.as_ref().and_then(CacheTraining::cache);
-        PathTracer { counts, cache, ..self.view.tracer(world, environment, self.tiles.grid()) }
+        PathTracer { counts, cache, ..self.view.tracer(lit, self.tiles.grid()) }
     }
 
     /// Notes seconds of rendering and the samples taken in them.
@@ -104,7 +102,8 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::environment::{EnvironmentOptions, sky};
+    use crate::environment::{Environment, EnvironmentOptions, sky};
+    use crate::path::World;
     use crate::render::{Gi, Sampling, Session};
     use crate::scene::builtin;
 
@@ -144,7 +143,7 @@ mod tests {
             session.advance(1, &goes_on).expect("the CPU does not fail");
         }
         let before = session.take_training().expect("it was trained").state().0;
-        let mut session = Session::resume(&world, &environment, session.suspend());
+        let mut session = Session::resume((&world, &environment), session.suspend());
         session.advance(1, &goes_on).expect("the CPU does not fail");
         let after = session.training().expect("it is trained").state().0;
         assert!(after >= before, "{after} paths in place of {before}");
@@ -164,7 +163,7 @@ mod tests {
                 while session.samples() < 7 {
                     session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
                     if is_put_aside {
-                        session = Session::resume(&world, &environment, session.suspend());
+                        session = Session::resume((&world, &environment), session.suspend());
                     }
                 }
                 session.film().clone()

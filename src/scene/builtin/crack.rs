@@ -120,15 +120,12 @@ fn barrel(b: &mut Builder, wood: Mat, iron: Mat, height: f32) {
     for t in [0.04, 0.22, 0.78, 0.96] {
         let (y, r) = (t * height, radius(t));
         let slope = (radius(t + 0.01) - r) * 100.0 / height * 0.02;
-        b.lathe(
-            iron,
-            48,
-            &[
-                (r - slope, y - 0.02),
-                (r - slope + 0.004, y - 0.02),
-                (r + slope + 0.004, y + 0.02),
-                (r + slope, y + 0.02),
-            ],
-        );
+        let profile = [
+            (r - slope, y - 0.02),
+            (r - slope + 0.004, y - 0.02),
+            (r + slope + 0.004, y + 0.02),
+            (r + slope, y + 0.02),
+        ];
+        b.lathe(iron, 48, &profile);
     }
 }

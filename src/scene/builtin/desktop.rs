@@ -64,20 +64,17 @@ pub(super) fn papers(b: &mut Builder, paper: Mat, count: u32, seed: u32) {
 
 /// A cup of pencils.
 pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
-    b.lathe(
-        cup,
-        32,
-        &[
-            (0.0, 0.0),
-            (0.036, 0.0),
-            (0.038, 0.002),
-            (0.038, 0.098),
-            (0.036, 0.1),
-            (0.034, 0.098),
-            (0.034, 0.006),
-            (0.0, 0.005),
-        ],
-    );
+    let profile = [
+        (0.0, 0.0),
+        (0.036, 0.0),
+        (0.038, 0.002),
+        (0.038, 0.098),
+        (0.036, 0.1),
+        (0.034, 0.098),
+        (0.034, 0.006),
+        (0.0, 0.005),
+    ];
+    b.lathe(cup, 32, &profile);
     let mut stream = Stream::new(3);
     for k in 0..7 {
         let (s, c) = (k as f32 * 0.9).sin_cos();

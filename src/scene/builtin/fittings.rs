@@ -136,17 +136,14 @@ pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, heigh
     });
     let elbow = knob + Vec3::Z * 0.045;
     let grip = elbow - Vec3::X * 0.12;
-    b.tube(
-        metal,
-        14,
-        &[
-            (knob, 0.009),
-            (elbow - Vec3::Z * 0.008, 0.009),
-            (elbow - Vec3::new(0.008, 0.0, 0.0), 0.009),
-            (grip, 0.0085),
-            (grip - Vec3::X * 0.003, 0.004),
-        ],
-    );
+    let path = [
+        (knob, 0.009),
+        (elbow - Vec3::Z * 0.008, 0.009),
+        (elbow - Vec3::new(0.008, 0.0, 0.0), 0.009),
+        (grip, 0.0085),
+        (grip - Vec3::X * 0.003, 0.004),
+    ];
+    b.tube(metal, 14, &path);
 }
 
 /// A curtain that hangs from `top` to `bottom` between `u` in a wall's frame, `offset` before the wall,

@@ -40,15 +40,12 @@ pub(super) fn round_table(b: &mut Builder, top: Mat, legs: Mat, radius: f32, hei
         let (s, c) = (k as f32 * TAU / 3.0 + 0.4).sin_cos();
         let out = Vec3::new(c, 0.0, s);
         let head = out * (radius * 0.55) + Vec3::Y * (height - 0.01);
-        b.tube(
-            legs,
-            20,
-            &[
-                (out * radius * 0.85, 0.012),
-                (out * radius * 0.62 + Vec3::Y * height * 0.75, 0.021),
-                (head, 0.022),
-            ],
-        );
+        let path = [
+            (out * radius * 0.85, 0.012),
+            (out * radius * 0.62 + Vec3::Y * height * 0.75, 0.021),
+            (head, 0.022),
+        ];
+        b.tube(legs, 20, &path);
     }
 }
 
@@ -130,11 +127,8 @@ pub(super) fn radiator(b: &mut Builder, enamel: Mat, width: f32, height: f32) {
     for i in 0..columns {
         let x = (i as f32 + 0.5) * 0.055 - 0.5 * width;
         for z in [0.035, 0.095] {
-            b.tube(
-                enamel,
-                12,
-                &[(Vec3::new(x, 0.10, z), 0.0135), (Vec3::new(x, height - 0.01, z), 0.0135)],
-            );
+            let path = [(Vec3::new(x, 0.10, z), 0.0135), (Vec3::new(x, height - 0.01, z), 0.0135)];
+            b.tube(enamel, 12, &path);
         }
         for y in [0.11, height - 0.02] {
             b.blob(enamel, Vec3::new(x, y, 0.065), Vec3::new(0.0275, 0.024, 0.055), [3.0, 2.5], 6);
@@ -178,11 +172,9 @@ pub(super) fn rug(b: &mut Builder, pattern: Mat, fringe: Mat, [width, depth]: [f
                     -0.0035,
                     stream.between(-0.012, 0.012),
                 );
-            b.tube(
-                fringe,
-                5,
-                &[(from, 0.003), (from.lerp(to, 0.5) + Vec3::Y * 0.001, 0.0026), (to, 0.0012)],
-            );
+            let path =
+                [(from, 0.003), (from.lerp(to, 0.5) + Vec3::Y * 0.001, 0.0026), (to, 0.0012)];
+            b.tube(fringe, 5, &path);
         }
     }
 }

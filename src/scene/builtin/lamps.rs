@@ -40,17 +40,14 @@ pub(super) fn arc_lamp(
 /// A lamp shade open at top and bottom, its top at y = 0.
 pub(super) fn drum_shade(b: &mut Builder, cloth: Mat, bottom: f32, top: f32, height: f32) {
     let wall = 0.003;
-    b.lathe(
-        cloth,
-        64,
-        &[
-            (bottom - wall, -height),
-            (bottom, -height),
-            (top, 0.0),
-            (top - wall, 0.0),
-            (bottom - wall, -height),
-        ],
-    );
+    let profile = [
+        (bottom - wall, -height),
+        (bottom, -height),
+        (top, 0.0),
+        (top - wall, 0.0),
+        (bottom - wall, -height),
+    ];
+    b.lathe(cloth, 64, &profile);
     for k in 0..3 {
         let (s, c) = (k as f32 * TAU / 3.0).sin_cos();
         b.rod(cloth, Vec3::Y * -0.02, Vec3::new(top * s * 0.99, -0.012, top * c * 0.99), 0.002);
@@ -115,26 +112,23 @@ pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
 /// A street lamp with a lantern.
 pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
     let h = height;
-    b.lathe(
-        metal,
-        24,
-        &[
-            (0.17, -0.01),
-            (0.17, 0.10),
-            (0.13, 0.14),
-            (0.10, 0.55),
-            (0.12, 0.58),
-            (0.12, 0.64),
-            (0.065, 0.70),
-            (0.05, 0.75 * h),
-            (0.075, 0.76 * h),
-            (0.075, 0.775 * h),
-            (0.042, 0.79 * h),
-            (0.038, h - 0.62),
-            (0.09, h - 0.58),
-            (0.11, h - 0.55),
-        ],
-    );
+    let profile = [
+        (0.17, -0.01),
+        (0.17, 0.10),
+        (0.13, 0.14),
+        (0.10, 0.55),
+        (0.12, 0.58),
+        (0.12, 0.64),
+        (0.065, 0.70),
+        (0.05, 0.75 * h),
+        (0.075, 0.76 * h),
+        (0.075, 0.775 * h),
+        (0.042, 0.79 * h),
+        (0.038, h - 0.62),
+        (0.09, h - 0.58),
+        (0.11, h - 0.55),
+    ];
+    b.lathe(metal, 24, &profile);
     b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
         b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
         for k in 0..6 {
@@ -146,19 +140,16 @@ pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
                 0.009,
             );
         }
-        b.lathe(
-            metal,
-            24,
-            &[
-                (0.0, 0.395),
-                (0.215, 0.395),
-                (0.22, 0.41),
-                (0.13, 0.50),
-                (0.05, 0.55),
-                (0.05, 0.58),
-                (0.022, 0.60),
-                (0.0, 0.66),
-            ],
-        );
+        let profile = [
+            (0.0, 0.395),
+            (0.215, 0.395),
+            (0.22, 0.41),
+            (0.13, 0.50),
+            (0.05, 0.55),
+            (0.05, 0.58),
+            (0.022, 0.60),
+            (0.0, 0.66),
+        ];
+        b.lathe(metal, 24, &profile);
     });
 }

@@ -166,18 +166,15 @@ fn shell(b: &mut Builder, m: &Palette) {
         // A wooden ring around the round opening.
         b.part(placed([ROUND[0], ROUND[1], 0.0], [90.0, 0.0, 0.0]), |b| {
             let r = ROUND[2];
-            b.lathe(
-                m.oak,
-                64,
-                &[
-                    (r + 0.056, -0.005),
-                    (r + 0.056, 0.014),
-                    (r + 0.05, 0.02),
-                    (r - 0.014, 0.02),
-                    (r - 0.02, 0.014),
-                    (r - 0.02, -0.10),
-                ],
-            );
+            let profile = [
+                (r + 0.056, -0.005),
+                (r + 0.056, 0.014),
+                (r + 0.05, 0.02),
+                (r - 0.014, 0.02),
+                (r - 0.02, 0.014),
+                (r - 0.02, -0.10),
+            ];
+            b.lathe(m.oak, 64, &profile);
         });
     });
 }

@@ -96,23 +96,20 @@ pub(super) fn book_stack(b: &mut Builder, mats: [Mat; 2], count: u32, seed: u32)
 
 /// A mug with a handle and a dark drink.
 pub(super) fn mug(b: &mut Builder, glaze: Mat, drink: Mat) {
-    b.lathe(
-        glaze,
-        40,
-        &[
-            (0.0, 0.0),
-            (0.032, 0.0),
-            (0.039, 0.006),
-            (0.041, 0.02),
-            (0.041, 0.091),
-            (0.0402, 0.0945),
-            (0.0385, 0.0945),
-            (0.0375, 0.091),
-            (0.0375, 0.012),
-            (0.030, 0.006),
-            (0.0, 0.006),
-        ],
-    );
+    let profile = [
+        (0.0, 0.0),
+        (0.032, 0.0),
+        (0.039, 0.006),
+        (0.041, 0.02),
+        (0.041, 0.091),
+        (0.0402, 0.0945),
+        (0.0385, 0.0945),
+        (0.0375, 0.091),
+        (0.0375, 0.012),
+        (0.030, 0.006),
+        (0.0, 0.006),
+    ];
+    b.lathe(glaze, 40, &profile);
     b.lathe(drink, 40, &[(0.0378, 0.078), (0.0, 0.078)]);
     let path: Vec<(Vec3, f32)> = (0..=12)
         .map(|i| {
@@ -208,18 +205,15 @@ pub(super) fn picture(
 /// A wall clock, its centre at the origin of a wall's frame.
 pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f32) {
     b.part(Affine3A::from_rotation_x(FRAC_PI_2), |b| {
-        b.lathe(
-            rim,
-            64,
-            &[
-                (radius, -0.002),
-                (radius, 0.024),
-                (radius - 0.004, 0.034),
-                (radius - 0.012, 0.04),
-                (radius - 0.02, 0.034),
-                (radius - 0.02, 0.02),
-            ],
-        );
+        let profile = [
+            (radius, -0.002),
+            (radius, 0.024),
+            (radius - 0.004, 0.034),
+            (radius - 0.012, 0.04),
+            (radius - 0.02, 0.034),
+            (radius - 0.02, 0.02),
+        ];
+        b.lathe(rim, 64, &profile);
         b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
     });
     for hour in 0..12 {
@@ -237,19 +231,16 @@ pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f3
 
 /// A waste-paper basket.
 pub(super) fn basket(b: &mut Builder, mat: Mat) {
-    b.lathe(
-        mat,
-        40,
-        &[
-            (0.0, 0.0),
-            (0.11, 0.0),
-            (0.115, 0.004),
-            (0.145, 0.30),
-            (0.149, 0.305),
-            (0.147, 0.31),
-            (0.142, 0.305),
-            (0.112, 0.01),
-            (0.0, 0.009),
-        ],
-    );
+    let profile = [
+        (0.0, 0.0),
+        (0.11, 0.0),
+        (0.115, 0.004),
+        (0.145, 0.30),
+        (0.149, 0.305),
+        (0.147, 0.31),
+        (0.142, 0.305),
+        (0.112, 0.01),
+        (0.0, 0.009),
+    ];
+    b.lathe(mat, 40, &profile);
 }

@@ -39,23 +39,20 @@ fn growing(at: Vec3, direction: Vec3) -> Affine3A {
 /// A flower pot with soil; returns the height of the soil.
 pub(super) fn pot(b: &mut Builder, clay: Mat, soil: Mat, radius: f32, height: f32) -> f32 {
     let (r, h) = (radius, height);
-    b.lathe(
-        clay,
-        48,
-        &[
-            (0.0, 0.0),
-            (0.70 * r, 0.0),
-            (0.72 * r, 0.01 * h),
-            (0.93 * r, 0.80 * h),
-            (0.99 * r, 0.81 * h),
-            (r, 0.83 * h),
-            (r, 0.97 * h),
-            (0.98 * r, h),
-            (0.92 * r, h),
-            (0.90 * r, 0.97 * h),
-            (0.86 * r, 0.80 * h),
-        ],
-    );
+    let profile = [
+        (0.0, 0.0),
+        (0.70 * r, 0.0),
+        (0.72 * r, 0.01 * h),
+        (0.93 * r, 0.80 * h),
+        (0.99 * r, 0.81 * h),
+        (r, 0.83 * h),
+        (r, 0.97 * h),
+        (0.98 * r, h),
+        (0.92 * r, h),
+        (0.90 * r, 0.97 * h),
+        (0.86 * r, 0.80 * h),
+    ];
+    b.lathe(clay, 48, &profile);
     b.lathe(soil, 40, &[(0.90 * r, 0.88 * h), (0.5 * r, 0.91 * h), (0.0, 0.90 * h)]);
     0.9 * h
 }
@@ -197,16 +194,13 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
     let thick = 0.022 * height;
     let kink =
         fork * 0.5 + Vec3::new(stream.between(-0.06, 0.06), 0.0, stream.between(-0.06, 0.06));
-    b.tube(
-        bark,
-        16,
-        &[
-            (Vec3::Y * -0.05, 1.5 * thick),
-            (Vec3::Y * 0.12, 1.1 * thick),
-            (kink, 0.95 * thick),
-            (fork, 0.8 * thick),
-        ],
-    );
+    let path = [
+        (Vec3::Y * -0.05, 1.5 * thick),
+        (Vec3::Y * 0.12, 1.1 * thick),
+        (kink, 0.95 * thick),
+        (fork, 0.8 * thick),
+    ];
+    b.tube(bark, 16, &path);
     let limbs = 7;
     for i in 0..limbs {
         let (s, c) = (i as f32 * 2.4 + stream.between(-0.3, 0.3)).sin_cos();
@@ -214,11 +208,9 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
         let top = height * stream.between(0.62, 0.85);
         let tip = Vec3::new(c * reach, top, s * reach);
         let elbow = fork.lerp(tip, 0.5) + Vec3::new(c, -0.4, s) * 0.04 * height;
-        b.tube(
-            bark,
-            8,
-            &[(fork - Vec3::Y * 0.08, 0.55 * thick), (elbow, 0.4 * thick), (tip, 0.15 * thick)],
-        );
+        let path =
+            [(fork - Vec3::Y * 0.08, 0.55 * thick), (elbow, 0.4 * thick), (tip, 0.15 * thick)];
+        b.tube(bark, 8, &path);
         let size = height * stream.between(0.13, 0.19);
         let half = Vec3::new(size, 0.8 * size, size);
         foliage(

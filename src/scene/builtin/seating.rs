@@ -87,16 +87,13 @@ pub(super) fn side_chair(b: &mut Builder, wood: Mat, seat: Mat) {
     for sx in [-1.0, 1.0] {
         let (front, back) = (Vec3::new(sx * 0.19, 0.0, 0.19), Vec3::new(sx * 0.18, 0.0, -0.21));
         b.tube(wood, 14, &[(front, 0.012), (Vec3::new(sx * 0.18, 0.44, 0.17), 0.018)]);
-        b.tube(
-            wood,
-            14,
-            &[
-                (back, 0.012),
-                (Vec3::new(sx * 0.175, 0.44, -0.17), 0.018),
-                (Vec3::new(sx * 0.17, 0.66, -0.185), 0.016),
-                (Vec3::new(sx * 0.165, 0.84, -0.225), 0.012),
-            ],
-        );
+        let path = [
+            (back, 0.012),
+            (Vec3::new(sx * 0.175, 0.44, -0.17), 0.018),
+            (Vec3::new(sx * 0.17, 0.66, -0.185), 0.016),
+            (Vec3::new(sx * 0.165, 0.84, -0.225), 0.012),
+        ];
+        b.tube(wood, 14, &path);
         b.rod(wood, Vec3::new(sx * 0.186, 0.22, 0.18), Vec3::new(sx * 0.178, 0.22, -0.19), 0.009);
     }
     b.slab(wood, [-0.20, 0.40, -0.19], [0.20, 0.435, 0.20], 0.008);
@@ -114,15 +111,12 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
     for k in 0..5 {
         let (s, c) = (k as f32 * TAU / 5.0).sin_cos();
         let out = Vec3::new(s, 0.0, c);
-        b.tube(
-            plastic,
-            12,
-            &[
-                (Vec3::Y * 0.11, 0.026),
-                (out * 0.17 + Vec3::Y * 0.10, 0.022),
-                (out * 0.30 + Vec3::Y * 0.075, 0.015),
-            ],
-        );
+        let path = [
+            (Vec3::Y * 0.11, 0.026),
+            (out * 0.17 + Vec3::Y * 0.10, 0.022),
+            (out * 0.30 + Vec3::Y * 0.075, 0.015),
+        ];
+        b.tube(plastic, 12, &path);
         for side in [-0.014, 0.014] {
             let hub = out * 0.30 + out.cross(Vec3::Y) * side + Vec3::Y * 0.027;
             let axle = out.cross(Vec3::Y) * 0.009;
@@ -133,16 +127,13 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
     b.drum(plastic, [0.08, 0.27], [0.036, 0.032], 0.004);
     b.slab(plastic, [-0.10, 0.40, -0.14], [0.10, 0.445, 0.12], 0.01);
     b.blob(cloth, Vec3::new(0.0, 0.475, 0.01), Vec3::new(0.25, 0.045, 0.245), [4.5, 2.8], 16);
-    b.tube(
-        plastic,
-        12,
-        &[
-            (Vec3::new(0.0, 0.425, -0.10), 0.020),
-            (Vec3::new(0.0, 0.43, -0.27), 0.020),
-            (Vec3::new(0.0, 0.52, -0.305), 0.020),
-            (Vec3::new(0.0, 0.78, -0.285), 0.018),
-        ],
-    );
+    let path = [
+        (Vec3::new(0.0, 0.425, -0.10), 0.020),
+        (Vec3::new(0.0, 0.43, -0.27), 0.020),
+        (Vec3::new(0.0, 0.52, -0.305), 0.020),
+        (Vec3::new(0.0, 0.78, -0.285), 0.018),
+    ];
+    b.tube(plastic, 12, &path);
     let shape = |u: f32, v: f32, side: f32| {
         let (x, y) = ((u - 0.5) * 2.0, (v - 0.5) * 2.0);
         let half = 0.225 - 0.03 * y * y;
@@ -157,16 +148,13 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
     b.sheet(cloth, [20, 20], Vec2::new(0.46, 0.56), |u, v| shape(u, v, 1.0));
     b.sheet(cloth, [20, 20], Vec2::new(0.46, 0.56), |u, v| shape(1.0 - u, v, -1.0));
     for sx in [-1.0, 1.0] {
-        b.tube(
-            plastic,
-            12,
-            &[
-                (Vec3::new(sx * 0.10, 0.43, -0.02), 0.014),
-                (Vec3::new(sx * 0.27, 0.44, -0.02), 0.014),
-                (Vec3::new(sx * 0.29, 0.50, -0.02), 0.014),
-                (Vec3::new(sx * 0.285, 0.66, -0.03), 0.014),
-            ],
-        );
+        let path = [
+            (Vec3::new(sx * 0.10, 0.43, -0.02), 0.014),
+            (Vec3::new(sx * 0.27, 0.44, -0.02), 0.014),
+            (Vec3::new(sx * 0.29, 0.50, -0.02), 0.014),
+            (Vec3::new(sx * 0.285, 0.66, -0.03), 0.014),
+        ];
+        b.tube(plastic, 12, &path);
         b.blob(
             plastic,
             Vec3::new(sx * 0.285, 0.675, 0.0),

@@ -160,15 +160,12 @@ pub(super) fn candle(b: &mut Builder, wax: Mat, wick: Mat, radius: f32, height: 
     ));
     profile.dedup();
     b.lathe(wax, 48, &profile);
-    b.tube(
-        wick,
-        8,
-        &[
-            (Vec3::Y * (h - 0.0095), 0.0012),
-            (Vec3::Y * (h + 0.004), 0.0012),
-            (Vec3::new(0.003, h + 0.009, 0.0), 0.001),
-        ],
-    );
+    let path = [
+        (Vec3::Y * (h - 0.0095), 0.0012),
+        (Vec3::Y * (h + 0.004), 0.0012),
+        (Vec3::new(0.003, h + 0.009, 0.0), 0.001),
+    ];
+    b.tube(wick, 8, &path);
 }
 
 /// A round paper lantern over hoops, its lower rim at y = 0, open above and below.

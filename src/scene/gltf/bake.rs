@@ -3,40 +3,27 @@
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use super::limits::{Fallible, MAX_TRIANGLES, check_count, check_growth};
-use super::part::{Part, Tally};
+use super::part::Part;
 use super::tangents::NO_TANGENT;
 use crate::scene::{Placing, Scene};
 
-/// Appends a part once for each instance. Memory is reserved only after the limits are checked.
-pub(super) fn append_instances(
-    scene: &mut Scene,
-    part: &Part,
-    instances: &[DAffine3],
-    tally: &mut Tally,
-) -> Fallible<()> {
-    check_limits(scene, part, instances.len())?;
-    for &world_from_mesh in instances {
-        let placing = Placing::new(world_from_mesh);
-        append(scene, part, |_| placing, placing.mirrors(), tally);
-    }
-    Ok(())
+/// Appends a part once for each place; returns how many triangles were dropped, as all of these functions do. Memory is
+/// reserved only after the limits are checked.
+pub(super) fn instances(scene: &mut Scene, part: &Part, places: &[DAffine3]) -> Fallible<usize> {
+    check_limits(scene, part, places.len())?;
+    let placings = places.iter().map(|&world_from_mesh| Placing::new(world_from_mesh));
+    Ok(placings.map(|placing| append(scene, part, |_| placing, placing.mirrors())).sum())
 }
 
 /// Appends a part as it is, for all its instances.
-pub(super) fn append_shared(scene: &mut Scene, part: &Part, tally: &mut Tally) -> Fallible<()> {
+pub(super) fn shared(scene: &mut Scene, part: &Part) -> Fallible<usize> {
     check_limits(scene, part, 1)?;
     let first = append_vertices(scene, part);
-    append_triangles(scene, part, first, |corners| corners, tally);
-    Ok(())
+    Ok(append_triangles(scene, part, first, false))
 }
 
 /// Appends a part whose vertices follow joints; `joints` are world from bind space.
-pub(super) fn append_skinned(
-    scene: &mut Scene,
-    part: &Part,
-    joints: &[DAffine3],
-    tally: &mut Tally,
-) -> Fallible<()> {
+pub(super) fn skinned(scene: &mut Scene, part: &Part, joints: &[DAffine3]) -> Fallible<usize> {
     check_limits(scene, part, 1)?;
     let stride = part.influences_per_vertex;
     let is_missing =
@@ -57,8 +44,7 @@ pub(super) fn append_skinned(
     // Joints of one skin mirror together or not at all, but for those that hide a limb.
     let shown = joints.iter().find(|joint| joint.matrix3.determinant() != 0.0);
     let mirrors = shown.is_some_and(|&joint| Placing::new(joint).mirrors());
-    append(scene, part, placing, mirrors, tally);
-    Ok(())
+    Ok(append(scene, part, placing, mirrors))
 }
 
 /// Bytes of a triangle with its place in the tree while that is built, and of a vertex.
@@ -87,11 +73,11 @@ fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
 /// Appends vertices as they are; the number of the first.
 fn append_vertices(scene: &mut Scene, part: &Part) -> usize {
     let first = scene.positions.len();
-    extend(&mut scene.normals, first, part.normals.iter().copied(), Vec3::ZERO);
-    extend(&mut scene.tangents, first, part.tangents.iter().copied(), NO_TANGENT);
-    extend(&mut scene.uvs[0], first, part.uvs[0].iter().copied(), Vec2::ZERO);
-    extend(&mut scene.uvs[1], first, part.uvs[1].iter().copied(), Vec2::ZERO);
-    extend(&mut scene.colors, first, part.colors.iter().copied(), Vec4::ONE);
+    extend(&mut scene.normals, first, &part.normals, Vec3::ZERO);
+    extend(&mut scene.tangents, first, &part.tangents, NO_TANGENT);
+    extend(&mut scene.uvs[0], first, &part.uvs[0], Vec2::ZERO);
+    extend(&mut scene.uvs[1], first, &part.uvs[1], Vec2::ZERO);
+    extend(&mut scene.colors, first, &part.colors, Vec4::ONE);
     scene.positions.extend_from_slice(&part.positions);
     first
 }
@@ -101,8 +87,7 @@ fn append(
     part: &Part,
     placing: impl Fn(usize) -> Placing,
     mirrors: bool,
-    tally: &mut Tally,
-) {
+) -> usize {
     let first = append_vertices(scene, part);
     for vertex in 0..part.positions.len() {
         let placing = placing(vertex);
@@ -117,38 +102,27 @@ fn append(
             *tangent = placing.tangent(*tangent);
         }
     }
-    let turned = |[a, b, c]: [u32; 3]| if mirrors { [a, c, b] } else { [a, b, c] };
-    append_triangles(scene, part, first, turned, tally);
+    append_triangles(scene, part, first, mirrors)
 }
 
-fn append_triangles(
-    scene: &mut Scene,
-    part: &Part,
-    first: usize,
-    turned: impl Fn([u32; 3]) -> [u32; 3],
-    tally: &mut Tally,
-) {
+fn append_triangles(scene: &mut Scene, part: &Part, first: usize, mirrors: bool) -> usize {
+    let before = scene.triangles.len();
     for corners in &part.triangles {
-        let triangle = turned(corners.map(|vertex| first as u32 + vertex));
+        let [a, b, c] = corners.map(|vertex| first as u32 + vertex);
+        let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
         if is_sound(triangle.map(|vertex| scene.positions[vertex as usize])) {
             scene.triangles.push(triangle);
             scene.triangle_materials.push(part.material);
-        } else {
-            tally.dropped_triangles += 1;
         }
     }
+    part.triangles.len() - (scene.triangles.len() - before)
 }
 
 /// Appends vertex data behind what the earlier vertices have; `pad` for those that have none.
-fn extend<T: Clone>(
-    array: &mut Vec<T>,
-    first: usize,
-    values: impl ExactSizeIterator<Item = T>,
-    pad: T,
-) {
-    if values.len() > 0 {
+fn extend<T: Copy>(array: &mut Vec<T>, first: usize, values: &[T], pad: T) {
+    if !values.is_empty() {
         array.resize(first, pad);
-        array.extend(values);
+        array.extend_from_slice(values);
     }
 }
 

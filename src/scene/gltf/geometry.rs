@@ -6,7 +6,7 @@ use gltf::json;
 use super::buffers::File;
 use super::limits::Fallible;
 use super::part::{Part, Tally};
-use super::primitive::{Source, Target};
+use super::primitive::{Morph, Source};
 use super::tangents;
 use crate::scene::{Material, TextureRef, TextureSlot};
 
@@ -41,28 +41,29 @@ impl Needs {
 pub(super) fn read_part(
     file: &File<'_>,
     primitive: &json::mesh::Primitive,
-    (targets, weights): (&[Target], &[f32]),
+    morph: Morph<'_>,
     material: u32,
     needs: &Needs,
     tally: &mut Tally,
 ) -> Fallible<Option<Part>> {
-    let Some(source) = Source::open(file, primitive, tally)? else { return Ok(None) };
+    let Some(mut source) = Source::open(file, primitive, tally)? else { return Ok(None) };
     let (vertices, triangles) = compact(source.triangles()?);
+    source.vertices = vertices;
     if triangles.is_empty() {
         return Ok(None);
     }
     let mut part = Part { triangles, material, ..Part::default() };
-    part.positions = source.positions(&vertices);
-    source.normals(&vertices, &mut part, tally)?;
+    part.positions = source.positions();
+    source.normals(&mut part)?;
     for set in 0..2 {
         if needs.uv_sets[set] {
-            part.uvs[set] = source.uvs(&vertices, set as u32, tally)?;
+            part.uvs[set] = source.uvs(set as u32)?;
         }
     }
-    part.colors = source.colors(&vertices, tally)?;
-    source.influences(&vertices, &mut part)?;
-    source.tangents(&vertices, &mut part, tally)?;
-    source.morph(&vertices, targets, weights, &mut part, tally)?;
+    part.colors = source.colors()?;
+    source.influences(&mut part)?;
+    source.tangents(&mut part)?;
+    source.morph(morph, &mut part)?;
     // Non-finite corners would spread through the tangents of a whole part.
     let before = part.triangles.len();
     let positions = &part.positions;

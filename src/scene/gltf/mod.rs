@@ -47,7 +47,7 @@ use std::sync::PoisonError;
 use glam::DAffine3;
 use gltf::json;
 
-use crate::error::{Error, Notices, Result};
+use crate::error::{At as _, Error, Notices, Result};
 use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
 use crate::scene::needs::is_emitter;
 use crate::scene::{Frame, Outlines, Scene, SceneOptions};
@@ -79,7 +79,7 @@ pub fn load(path: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
-    let bytes = read_file(path).map_err(|cause| Error::at(path, cause))?;
+    let bytes = read_file(path).at(path)?;
     if looks_like_picture(&bytes) {
         return Err(Error::at(path, "is a picture, where a scene is expected; --env takes a map"));
     }
@@ -87,8 +87,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
         return Err(Error::at(path, IS_A_FILM));
     }
     let base_dir = path.parent().unwrap_or(Path::new(""));
-    let mut scene =
-        read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
+    let mut scene = read(&bytes, Some(base_dir), options).at(path)?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(scene)
 }
@@ -99,7 +98,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
     let options = SceneOptions::default();
-    let mut scene = read(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
+    let mut scene = read(bytes, base_dir, &options).at(name)?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
@@ -152,7 +151,7 @@ fn read_in(
     let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, frame, &mut notices)?;
     let mut lights = viewpoints::lights(document, &nodes, &mut notices)?;
     lamps::scale(&mut lights, options.lamps, document.generator.as_deref(), &mut notices);
-    let mut scene = Scene {
+    let scene = Scene {
         cameras,
         camera_paths,
         lights: lights.into_iter().map(|light| viewpoints::placed(light, frame)).collect(),
@@ -160,7 +159,7 @@ fn read_in(
         frame,
         ..Scene::default()
     };
-    let mut tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
+    let tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
     let look = Look::choose(document, options.variant.as_deref(), &mut notices)?;
     let used = used_materials(document, &placements, &look)?;
     let mut materials = Materials::load(&file, &used, &mut notices)?;
@@ -169,19 +168,18 @@ fn read_in(
         let material = materials.places[&look.material(primitive)];
         is_emitter(&materials.materials[material as usize])
     };
-    let mut sharing = Sharing::choose(document, &placements, is_lamp)?;
-    let mut reading = Reading { file: &file, nodes: &nodes, look: &look, materials };
+    let sharing = Sharing::choose(document, &placements, is_lamp)?;
+    let (file, nodes, look) = (&file, &nodes, &look);
+    let mut reading = Reading { file, nodes, look, materials, sharing, scene, tally };
     for (&number, placements) in &placements {
         let mesh: Mesh = document.meshes.get_as(json::Index::new(number))?;
-        reading
-            .append_mesh(number, &mesh, placements, &mut scene, &mut sharing, &mut tally)
-            .map_err(|cause| match &mesh.name {
-                Some(name) => format!("mesh {number} ({name}): {cause}"),
-                None => format!("mesh {number}: {cause}"),
-            })?;
+        reading.append_mesh(number, &mesh, placements).map_err(|cause| match &mesh.name {
+            Some(name) => format!("mesh {number} ({name}): {cause}"),
+            None => format!("mesh {number}: {cause}"),
+        })?;
     }
+    let Reading { materials, sharing, mut scene, mut tally, .. } = reading;
     sharing.finish(&mut scene)?;
-    let materials = reading.materials;
     materials.tell_of_sheets(&mut notices);
     if scene.triangles.is_empty() && !is_known && !frame.is_identity() {
         return read_in(bytes, base_dir, options, Some(Frame::default()));
@@ -249,19 +247,14 @@ struct Reading<'a> {
     nodes: &'a Nodes,
     look: &'a Look,
     materials: Materials,
+    sharing: Sharing,
+    scene: Scene,
+    tally: Tally,
 }
 
 impl Reading<'_> {
     /// Appends all placements of one mesh, reading it again only where morph weights differ.
-    fn append_mesh(
-        &mut self,
-        number: u32,
-        mesh: &Mesh,
-        placements: &[Placement],
-        scene: &mut Scene,
-        sharing: &mut Sharing,
-        tally: &mut Tally,
-    ) -> Fallible<()> {
+    fn append_mesh(&mut self, number: u32, mesh: &Mesh, placements: &[Placement]) -> Fallible<()> {
         let mut read: Option<(&[f32], Vec<Part>)> = None;
         let mut posed: Option<(json::Index<json::Skin>, Vec<DAffine3>)> = None;
         for (place, placement) in placements.iter().enumerate() {
@@ -270,7 +263,7 @@ impl Reading<'_> {
             let parts = match read.take() {
                 Some((known, parts)) if known == weights => parts,
                 _ => {
-                    let mut parts = self.read_parts(mesh, weights, tally)?;
+                    let mut parts = self.read_parts(mesh, weights)?;
                     self.open_sheets(&mut parts, placement.instances.first())?;
                     parts
                 }
@@ -288,32 +281,33 @@ impl Reading<'_> {
             };
             let is_shared = |part: &&Part| {
                 let material = &self.materials.materials[part.material as usize];
-                sharing.wanted.contains(&number) && !is_emitter(material)
+                self.sharing.wanted.contains(&number) && !is_emitter(material)
             };
             let shared: Vec<&Part> = parts.iter().filter(is_shared).collect();
             let extent = share::extent(&shared);
             for part in &parts {
-                match joints {
+                self.tally.dropped_triangles += match joints {
                     Some(joints) if part.influences_per_vertex > 0 => {
-                        bake::append_skinned(scene, part, joints, tally)?;
+                        bake::skinned(&mut self.scene, part, joints)?
                     }
                     _ if is_shared(&part) => {
                         let cannot = |at: &DAffine3| !share::can_share(*at, extent);
                         let rest = placement.instances.iter().copied().filter(cannot);
-                        bake::append_instances(scene, part, &rest.collect::<Vec<_>>(), tally)?;
+                        bake::instances(&mut self.scene, part, &rest.collect::<Vec<_>>())?
                     }
-                    _ => bake::append_instances(scene, part, &placement.instances, tally)?,
-                }
+                    _ => bake::instances(&mut self.scene, part, &placement.instances)?,
+                };
             }
-            if place == 0 && sharing.wanted.contains(&number) {
-                sharing.add(scene, &shared, placements, tally)?;
+            if place == 0 && self.sharing.wanted.contains(&number) {
+                let dropped = self.sharing.add(&mut self.scene, &shared, placements)?;
+                self.tally.dropped_triangles += dropped;
             }
             read = Some((weights, parts));
         }
         Ok(())
     }
 
-    fn read_parts(&self, mesh: &Mesh, weights: &[f32], tally: &mut Tally) -> Fallible<Vec<Part>> {
+    fn read_parts(&mut self, mesh: &Mesh, weights: &[f32]) -> Fallible<Vec<Part>> {
         let mut parts = Vec::new();
         let (mut triangles, mut bytes) = (0, 0);
         for (number, primitive) in mesh.primitives().enumerate() {
@@ -321,11 +315,9 @@ impl Reading<'_> {
             let material = self.materials.places[&self.look.material(&primitive)];
             let needs = Needs::of(&self.materials.materials[material as usize]);
             let targets = if weights.is_empty() { Vec::new() } else { mesh.targets(number)? };
-            let read = |tally| {
-                let morph = (&targets[..], weights);
-                geometry::read_part(self.file, &primitive, morph, material, &needs, tally)
-            };
-            let part = read(tally).map_err(|cause| format!("primitive {number}: {cause}"))?;
+            let (morph, tally) = ((&targets[..], weights), &mut self.tally);
+            let part = geometry::read_part(self.file, &primitive, morph, material, &needs, tally)
+                .map_err(|cause| format!("primitive {number}: {cause}"))?;
             let Some(part) = part else { continue };
             // Many may share the same long list of corners.
             triangles += part.triangles.len() as u64;

@@ -70,14 +70,20 @@ pub(super) struct Source<'a> {
     mode: Mode,
     /// What was packed of it.
     draco: Option<Unpacked>,
+    /// Those that triangles have as corners.
+    pub(super) vertices: Vec<u32>,
+    tally: &'a mut Tally,
 }
+
+/// Morph targets with their weights.
+pub(super) type Morph<'a> = (&'a [Target], &'a [f32]);
 
 impl<'a> Source<'a> {
     /// `None` (and counted) for points, lines and primitives without positions.
     pub(super) fn open(
         file: &'a File<'_>,
         primitive: &'a json::mesh::Primitive,
-        tally: &mut Tally,
+        tally: &'a mut Tally,
     ) -> Fallible<Option<Self>> {
         let Checked::Valid(mode) = primitive.mode else {
             return Err("its mode is unknown to glTF 2.0".into());
@@ -91,7 +97,9 @@ impl<'a> Source<'a> {
                     let draco = Unpacked::open(file, primitive)?;
                     let semantic = Semantic::Positions;
                     let positions = open(file, draco.as_ref(), &semantic, accessor, &[Type::Vec3])?;
-                    return Ok(Some(Self { file, primitive, positions, mode, draco }));
+                    let vertices = Vec::new();
+                    let source = Self { file, primitive, positions, mode, draco, vertices, tally };
+                    return Ok(Some(source));
                 }
                 tally.without_positions += 1;
             }
@@ -102,19 +110,14 @@ impl<'a> Source<'a> {
     /// An attribute, which must be as long as the positions.
     fn attribute(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
         let found = self.find(semantic, types)?;
-        found.map(|(accessor, elements)| self.per_vertex(accessor, elements)).transpose()
+        found.map(|found| self.per_vertex(found)).transpose()
     }
 
     /// An attribute that shading can do without: one that is too short is counted and left out.
-    fn optional(
-        &self,
-        semantic: &Semantic,
-        types: &[Type],
-        tally: &mut Tally,
-    ) -> Fallible<Option<Elements<'a>>> {
+    fn optional(&mut self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
         let Some((_, elements)) = self.find(semantic, types)? else { return Ok(None) };
         let is_short = elements.count < self.positions.count;
-        tally.short_attributes += usize::from(is_short);
+        self.tally.short_attributes += usize::from(is_short);
         Ok((!is_short).then_some(elements))
     }
 
@@ -128,11 +131,7 @@ impl<'a> Source<'a> {
         accessor.map(open).transpose()
     }
 
-    fn per_vertex(
-        &self,
-        accessor: json::Index<json::Accessor>,
-        elements: Elements<'a>,
-    ) -> Fallible<Elements<'a>> {
+    fn per_vertex(&self, (accessor, elements): Found<'a>) -> Fallible<Elements<'a>> {
         if elements.count < self.positions.count {
             let (count, vertices) = (elements.count, self.positions.count);
             return Err(format!(
@@ -178,44 +177,41 @@ impl<'a> Source<'a> {
     }
 
     /// Positions of some vertices.
-    pub(super) fn positions(&self, vertices: &[u32]) -> Vec<Vec3> {
-        vertices.iter().map(|&v| Vec3::from_array(self.positions.floats(v as usize))).collect()
+    pub(super) fn positions(&self) -> Vec<Vec3> {
+        let vertices = self.vertices.iter();
+        vertices.map(|&v| Vec3::from_array(self.positions.floats(v as usize))).collect()
     }
 
     /// Unit normals, zero (and counted) where they cannot be used.
-    pub(super) fn normals(
-        &self,
-        vertices: &[u32],
-        part: &mut Part,
-        tally: &mut Tally,
-    ) -> Fallible<()> {
-        let Some(elements) = self.optional(&Semantic::Normals, &[Type::Vec3], tally)? else {
+    pub(super) fn normals(&mut self, part: &mut Part) -> Fallible<()> {
+        let Some(elements) = self.optional(&Semantic::Normals, &[Type::Vec3])? else {
             return Ok(());
         };
-        for &vertex in vertices {
+        for &vertex in &self.vertices {
             let normal = unit(Vec3::from_array(elements.floats(vertex as usize)));
-            tally.bad_normals += usize::from(normal == Vec3::ZERO);
+            self.tally.bad_normals += usize::from(normal == Vec3::ZERO);
             part.normals.push(normal);
         }
         Ok(())
     }
 
     /// A set of texture coordinates; empty if there is none.
-    pub(super) fn uvs(&self, vertices: &[u32], set: u32, tally: &mut Tally) -> Fallible<Vec<Vec2>> {
+    pub(super) fn uvs(&mut self, set: u32) -> Fallible<Vec<Vec2>> {
         // Some exporters write the third coordinate of volume textures.
         let types = [Type::Vec2, Type::Vec3];
-        let Some(elements) = self.optional(&Semantic::TexCoords(set), &types, tally)? else {
+        let Some(elements) = self.optional(&Semantic::TexCoords(set), &types)? else {
             return Ok(Vec::new());
         };
-        let read =
-            |&vertex: &u32| usable_uv(Vec2::from_array(elements.floats(vertex as usize)), tally);
-        Ok(vertices.iter().map(read).collect())
+        let read = |&vertex: &u32| {
+            usable_uv(Vec2::from_array(elements.floats(vertex as usize)), self.tally)
+        };
+        Ok(self.vertices.iter().map(read).collect())
     }
 
     /// Linear colours with alpha; empty if there are none.
-    pub(super) fn colors(&self, vertices: &[u32], tally: &mut Tally) -> Fallible<Vec<Vec4>> {
+    pub(super) fn colors(&mut self) -> Fallible<Vec<Vec4>> {
         let types = [Type::Vec3, Type::Vec4];
-        let Some(elements) = self.optional(&Semantic::Colors(0), &types, tally)? else {
+        let Some(elements) = self.optional(&Semantic::Colors(0), &types)? else {
             return Ok(Vec::new());
         };
         let elements = elements.with_fractions();
@@ -224,21 +220,16 @@ impl<'a> Source<'a> {
             if elements.components == 3 {
                 color.w = 1.0;
             }
-            usable_color(color, tally)
+            usable_color(color, self.tally)
         };
-        Ok(vertices.iter().map(read).collect())
+        Ok(self.vertices.iter().map(read).collect())
     }
 
     /// Tangents of the file; without normals they mean nothing (section 3.7.2.1).
-    pub(super) fn tangents(
-        &self,
-        vertices: &[u32],
-        part: &mut Part,
-        tally: &mut Tally,
-    ) -> Fallible<()> {
-        let elements = self.optional(&Semantic::Tangents, &[Type::Vec4], tally)?;
+    pub(super) fn tangents(&mut self, part: &mut Part) -> Fallible<()> {
+        let elements = self.optional(&Semantic::Tangents, &[Type::Vec4])?;
         if let Some(elements) = elements.filter(|_| !part.normals.is_empty()) {
-            let tangents = vertices.iter().map(|&vertex| {
+            let tangents = self.vertices.iter().map(|&vertex| {
                 let tangent = Vec4::from_array(elements.floats(vertex as usize));
                 let sign = if tangent.w < 0.0 { -1.0 } else { 1.0 };
                 let direction = unit(tangent.truncate());
@@ -251,7 +242,7 @@ impl<'a> Source<'a> {
     }
 
     /// Joints and weights of all sets, weights summing to one.
-    pub(super) fn influences(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
+    pub(super) fn influences(&self, part: &mut Part) -> Fallible<()> {
         let mut sets = Vec::new();
         for set in 0.. {
             let joints = self.attribute(&Semantic::Joints(set), &[Type::Vec4])?;
@@ -263,9 +254,9 @@ impl<'a> Source<'a> {
             sets.push((joints, weights.with_fractions()));
         }
         part.influences_per_vertex = 4 * sets.len();
-        let influences = vertices.len() * part.influences_per_vertex;
+        let influences = self.vertices.len() * part.influences_per_vertex;
         memory::check((influences * size_of::<(u32, f32)>()) as u64)?;
-        for &vertex in vertices {
+        for &vertex in &self.vertices {
             let first = part.influences.len();
             for (joints, weights) in &sets {
                 let joints = joints.integers::<4>(vertex as usize);
@@ -278,21 +269,14 @@ impl<'a> Source<'a> {
     }
 
     /// Adds morph targets to what there is of each vertex (section 3.7.2.2).
-    pub(super) fn morph(
-        &self,
-        vertices: &[u32],
-        targets: &[Target],
-        weights: &[f32],
-        part: &mut Part,
-        tally: &mut Tally,
-    ) -> Fallible<()> {
+    pub(super) fn morph(&mut self, morph: Morph<'_>, part: &mut Part) -> Fallible<()> {
         const VEC2: &[Type] = &[Type::Vec2];
         const VEC3: &[Type] = &[Type::Vec3];
         const COLOR: &[Type] = &[Type::Vec3, Type::Vec4];
         let mut is_morphed = false;
-        for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+        for (target, &weight) in morph.0.iter().zip(morph.1).filter(|(_, weight)| **weight != 0.0) {
             is_morphed = true;
-            let shift = Shift { source: self, vertices, weight };
+            let shift = Shift { source: self, weight };
             shift.add(target.position, VEC3, &mut part.positions)?;
             shift.add(target.normal, VEC3, &mut part.normals)?;
             let [first, second] = &mut part.uvs;
@@ -309,9 +293,9 @@ impl<'a> Source<'a> {
             *normal = unit(*normal);
         }
         if is_morphed {
-            part.uvs.iter_mut().flatten().for_each(|uv| *uv = usable_uv(*uv, tally));
+            part.uvs.iter_mut().flatten().for_each(|uv| *uv = usable_uv(*uv, self.tally));
             let colors = part.colors.iter_mut();
-            colors.for_each(|color| *color = usable_color(*color, tally).min(Vec4::ONE));
+            colors.for_each(|color| *color = usable_color(*color, self.tally).min(Vec4::ONE));
         }
         Ok(())
     }
@@ -320,7 +304,6 @@ impl<'a> Source<'a> {
 /// What a morph target adds to some vertices.
 struct Shift<'a> {
     source: &'a Source<'a>,
-    vertices: &'a [u32],
     weight: f32,
 }
 
@@ -336,8 +319,8 @@ impl Shift<'_> {
     {
         let Some(accessor) = accessor else { return Ok(()) };
         let elements = Elements::open(self.source.file, accessor, types)?;
-        let elements = self.source.per_vertex(accessor, elements)?;
-        for (value, &vertex) in values.iter_mut().zip(self.vertices) {
+        let elements = self.source.per_vertex((accessor, elements))?;
+        for (value, &vertex) in values.iter_mut().zip(&self.source.vertices) {
             *value += V::from(elements.floats(vertex as usize)) * self.weight;
         }
         Ok(())

@@ -15,7 +15,7 @@ use json::validation::Checked;
 use super::bake;
 use super::document::Document;
 use super::limits::Fallible;
-use super::part::{Part, Tally};
+use super::part::Part;
 use super::placement::Placement;
 use super::primitive::Mesh;
 use crate::bvh;
@@ -76,8 +76,7 @@ impl Sharing {
         scene: &mut Scene,
         parts: &[&Part],
         placements: &[Placement],
-        tally: &mut Tally,
-    ) -> Fallible<()> {
+    ) -> Fallible<usize> {
         let extent = extent(parts);
         let places = placements.iter().flat_map(|placement| &placement.instances);
         memory::check(INSTANCE_BYTES * places.clone().count() as u64)?;
@@ -85,13 +84,13 @@ impl Sharing {
         let mesh = self.meshes.len() as u32;
         let instance = |&place: &DAffine3| Instance { mesh, placing: Placing::new(place) };
         self.instances.extend(places.map(instance));
-        let first = scene.triangles.len();
+        let (first, mut dropped) = (scene.triangles.len(), 0);
         for part in parts {
-            bake::append_shared(scene, part, tally)?;
+            dropped += bake::shared(scene, part)?;
         }
         let triangles = scene.triangles.split_off(first);
         self.meshes.push((triangles, scene.triangle_materials.split_off(first)));
-        Ok(())
+        Ok(dropped)
     }
 
     /// Puts the meshes behind all other triangles.

@@ -110,7 +110,7 @@ impl Fixture {
     }
 
     pub(super) fn tracer(&self) -> PathTracer<'_> {
-        self.view.tracer(&self.world, &self.environment, Some(&self.grid))
+        self.view.tracer((&self.world, &self.environment), Some(&self.grid))
     }
 }
 
