@@ -61,7 +61,7 @@ fn gestures(ui: &mut Ui) {
 }
 
 fn list<'a>(ui: &mut Ui, id: &str, lines: impl Iterator<Item = (String, &'a str)>) {
-    Grid::new(id).num_columns(2).spacing([16.0, 7.0]).show(ui, |ui| {
+    Grid::new(id).num_columns(2).spacing([16.0, 5.5]).show(ui, |ui| {
         for (keys, what) in lines {
             Frame::new()
                 .fill(Color32::from_rgb(56, 59, 66))
