@@ -335,7 +335,7 @@ fn the_sun_is_put_where_it_is_asked_for_and_marked_there() {
     studio.asks(Command::PutSun { place, is_last: true });
     assert!(sunlit(&mut studio) > 1.0);
     assert!(studio.app.messages.list().is_empty(), "{:?}", studio.app.messages.list());
-    // The ceiling cannot be reached: what is said of it is said when the pointer is let go.
+    // The sun cannot reach the ceiling; the notice comes when the pointer is let go.
     let place = Vec2::new(0.5, 0.02);
     studio.asks(Command::PutSun { place, is_last: false });
     assert!(studio.app.messages.list().is_empty());

@@ -16,8 +16,9 @@ const AZIMUTHS: u16 = 720;
 const MARGIN_DEGREES: f64 = 5.0;
 /// Least cosine between the sun and a surface's normal: a grazing sun lights nothing.
 const MIN_COSINE: f32 = 0.05;
-/// Azimuths tried, and pixels across the picture, where the sun is to come near a place.
+/// Azimuths tried where the sun is to come near a place.
 const AZIMUTHS_NEAR: u16 = 180;
+/// Pixels across the picture whose surfaces are tried then.
 const COLUMNS_NEAR: u32 = 48;
 /// What counts as near, as a share of the median distance to what is in view.
 const NEARNESS: f32 = 0.25;
@@ -113,14 +114,14 @@ fn rotation_near(world: &World, view: &View, sun: &Sun, position: Vec3) -> Optio
     let rated = rotations.filter_map(|rotation| {
         let direction = sun.direction(rotation);
         let lit = spots.iter().filter(|(spot, _)| is_sunlit(world, sun, spot, rotation));
-        let weight = |(spot, distance): &(Spot, f32)| {
-            spot.normal.dot(direction) / (1.0 + (distance / near).powi(4))
-        };
-        let lit: Vec<_> = lit.collect();
-        Some((lit.iter().map(|it| weight(it)).sum::<f32>(), rotation, lit.first()?.1))
+        let lit: Vec<&(Spot, f32)> = lit.collect();
+        let weights = lit
+            .iter()
+            .map(|(spot, distance)| spot.normal.dot(direction) / (1.0 + (distance / near).powi(4)));
+        Some((weights.sum::<f32>(), rotation, lit.first()?.1))
     });
-    let best = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some((best.1, best.2))
+    let (_, rotation, nearest) = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((rotation, nearest))
 }
 
 /// Steps, in either direction around a circle, from the first place to the nearest that lies well inside of a run of

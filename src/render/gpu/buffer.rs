@@ -1,6 +1,6 @@
 //! Buffers on a device.
 
-/// A buffer of so many bytes, which hold nothing yet.
+/// A buffer of `size` bytes without content.
 pub(crate) fn buffer(
     device: &wgpu::Device,
     label: Option<&str>,
