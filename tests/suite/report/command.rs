@@ -169,14 +169,16 @@ fn the_reference_grows_until_it_is_good_enough() {
 fn a_given_reference_is_judged_by_the_runs() {
     let bench = Bench::new();
     let render = "render scene.gltf --env map.exr --size 32x18 --bounces 2 --filter box";
-    succeed(&bench, &format!("{render} --spp 4096 --seed 5 -o good.exr"));
+    succeed(&bench, &format!("{render} --spp 16384 --seed 5 -o good.exr"));
     let good = read_picture(&bench.path("good.exr")).expect("a picture");
     let mut wrong = good.clone();
     wrong.pixels.iter_mut().for_each(|rgb| *rgb = rgb.map(|v| 1.3 * v));
     let picture = ExrPicture { image: &wrong, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("wrong.exr"), picture).expect("written");
+    // Short runs: the error of what a quick machine renders in them still exceeds the reference's noise by far.
+    let line = LINE.replace("--seconds 0.4", "--seconds 0.1");
     let share = |file: &str| {
-        succeed(&bench, &format!("{LINE}-{file} --reference {file}"));
+        succeed(&bench, &format!("{line}-{file} --reference {file}"));
         let row = bench.json(&format!("out-{file}/report.json"))["rows"][0].clone();
         (number(&row["reference"]["share"]), row["reference"]["is_good"] == true)
     };
