@@ -12,8 +12,9 @@ use crate::environment::Environment;
 use crate::light_grid::counters::Tally;
 use crate::light_grid::tile_distributions::TileDistributions;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
-use crate::path::World;
+use crate::path::Lit;
 use crate::radiance_cache::KnownCell;
+use crate::render::light_parts::LightParts;
 use crate::render::surface_map::{Spot, look_at_place};
 
 /// Directions per tile for the truth: a standard error of some per cent for tiles half seen.
@@ -42,14 +43,19 @@ pub(super) struct Inspected {
     pub(super) cached: Option<KnownCell>,
 }
 
-/// True visible energy of each tile at a point, normalised to 1.
+/// What light truly arrives at a point, and goes from there to the camera.
 pub(super) struct Truth {
     /// Where.
     position: Vec3,
     /// Of which map, turned and scaled.
     environment: Arc<Environment>,
-    /// Share of each tile.
+    /// True visible energy of each tile, normalised to 1.
     pub(super) shares: Vec<f32>,
+    /// What arrives of the map's light, as a share of what a surface would receive if nothing were in the way; 0 where
+    /// the map has nothing on that side.
+    pub(super) unblocked: f32,
+    /// What the pixel's light is made of.
+    pub(super) parts: LightParts,
 }
 
 /// Follows the pointer.
@@ -140,12 +146,16 @@ impl Inspector {
         snapshot: &Arc<Snapshot>,
     ) -> Option<impl FnOnce() -> Truth + Send + use<>> {
         let inspected = self.inspected.as_ref().filter(|_| !self.busy)?;
+        let (place, _) = self.source?;
         let (spot, snapshot) = (inspected.spot, Arc::clone(snapshot));
         self.busy = true;
         Some(move || {
             let environment = Arc::clone(&snapshot.request.environment);
-            let shares = true_shares(&snapshot.request.world, &environment, &spot);
-            Truth { position: spot.position, environment, shares }
+            let lit = (&*snapshot.request.world, &*environment);
+            let (shares, unblocked) = true_shares(lit, &spot);
+            let grid = snapshot.main.grid.as_deref();
+            let parts = LightParts::measure(lit, &snapshot.view(), grid, place);
+            Truth { position: spot.position, environment, shares, unblocked, parts }
         })
     }
 }
@@ -188,30 +198,60 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
     Some(inspected)
 }
 
-/// Share of each tile in what a Lambertian surface at the spot would reflect of the map.
-fn true_shares(world: &World, environment: &Environment, spot: &Spot) -> Vec<f32> {
+/// Share of each tile in what a Lambertian surface at the spot would reflect of the map, and the share of all in what it
+/// would reflect if nothing were in the way.
+fn true_shares((world, environment): Lit<'_>, spot: &Spot) -> (Vec<f32>, f32) {
     let origin = offset_origin(spot.position, spot.normal);
-    let energies: Vec<f64> = (0..environment.tile_count())
+    // Energies with what is in the way, and without.
+    let energies: Vec<[f64; 2]> = (0..environment.tile_count())
         .map(|tile| {
-            (0..TRUTH_SAMPLES)
-                .map(|i| {
-                    // R2 sequence (Roberts 2018).
-                    let u = [0xc13f_a9a9_u32, 0x91e1_0da5].map(|step| step.wrapping_mul(i));
-                    let Some(sample) = environment.sample_in_tile(tile, u) else { return 0.0 };
-                    let cosine = spot.normal.dot(sample.direction);
-                    if cosine <= 0.0 {
-                        return 0.0;
-                    }
+            let mut sums = [0.0; 2];
+            for i in 0..TRUTH_SAMPLES {
+                // R2 sequence (Roberts 2018).
+                let u = [0xc13f_a9a9_u32, 0x91e1_0da5].map(|step| step.wrapping_mul(i));
+                let Some(sample) = environment.sample_in_tile(tile, u) else { break };
+                let cosine = spot.normal.dot(sample.direction);
+                if cosine > 0.0 {
                     let direction = sample.direction;
                     let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-                    let light = importance(
-                        environment.sampled_radiance(&sample) * world.transmittance(&ray),
-                    );
-                    f64::from(sample.weight * light * cosine / sample.pdf_solid_angle)
-                })
-                .sum()
+                    let radiance = environment.sampled_radiance(&sample);
+                    let passed = [radiance * world.transmittance(&ray), radiance];
+                    let weight = f64::from(sample.weight * cosine / sample.pdf_solid_angle);
+                    for (sum, light) in sums.iter_mut().zip(passed) {
+                        *sum += weight * f64::from(importance(light));
+                    }
+                }
+            }
+            sums
         })
         .collect();
-    let total: f64 = energies.iter().sum();
-    energies.iter().map(|e| if total > 0.0 { (e / total) as f32 } else { 0.0 }).collect()
+    let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole) as f32 } else { 0.0 };
+    let [arriving, whole] = [0, 1].map(|i| energies.iter().map(|e| e[i]).sum::<f64>());
+    let shares = energies.iter().map(|[energy, _]| share(*energy, arriving)).collect();
+    (shares, share(arriving, whole))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::path::WorldBuilder;
+    use crate::scene::Material;
+
+    #[test]
+    fn half_the_map_arrives_at_a_floor_beside_an_endless_wall() {
+        let map = Environment::new(Image::filled(32, 16, [1.0; 3]), &Default::default());
+        let map = map.expect("a sound map");
+        let [low, high] = [Vec3::new(-9.0, 0.0, -9.0), Vec3::new(9.0, 18.0, 9.0)];
+        let spot = Spot { position: Vec3::new(8.99, 0.0, 0.0), normal: Vec3::Y, material: 0 };
+        for (faces, expected) in [(vec![3], 1.0), (vec![0, 3], 0.5), (vec![0, 1, 2, 3, 4, 5], 0.0)]
+        {
+            let builder = WorldBuilder::default();
+            let world = builder.faces(&Material::lambert(0.5), low, high, faces.clone()).build();
+            let (shares, unblocked) = true_shares((&world, &map), &spot);
+            assert!((unblocked - expected).abs() < 0.01, "{faces:?}: {unblocked}");
+            let sum: f32 = shares.iter().sum();
+            assert!((sum - f32::from(unblocked > 0.0)).abs() < 1e-4, "{faces:?}: {sum}");
+        }
+    }
 }

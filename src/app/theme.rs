@@ -245,6 +245,16 @@ pub(super) fn count(value: u64) -> String {
     if value < 10_000 { value.to_string() } else { figure(value as f64) }
 }
 
+/// A share in per cent, with as many digits as it needs.
+pub(super) fn percent(share: f32) -> String {
+    match 100.0 * share {
+        p if p >= 9.95 => format!("{p:.1} %"),
+        p if p >= 0.01 => format!("{p:.2} %"),
+        p if p > 0.0 => format!("{p:.0e} %"),
+        _ => "0 %".to_owned(),
+    }
+}
+
 /// A box's sides in metres, in the unit that suits the longest.
 pub(super) fn extent(size: Vec3) -> String {
     let (factor, unit) = match size.max_element() {

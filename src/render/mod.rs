@@ -14,6 +14,8 @@ pub mod gpu;
 mod gpu_facts;
 #[cfg(feature = "window")]
 pub(crate) mod keyframe;
+#[cfg(feature = "window")]
+pub(crate) mod light_parts;
 mod pass;
 mod progress;
 mod session;

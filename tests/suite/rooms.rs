@@ -132,7 +132,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 49),
-    ("app", 11221),
+    ("app", 11336),
     ("bench", 581),
     ("bsdf", 1417),
     ("bvh", 1352),
@@ -158,7 +158,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("path", 2791),
     ("prefetch", 15),
     ("radiance_cache", 348),
-    ("render", 6578),
+    ("render", 6661),
     ("report", 3076),
     ("sampler", 145),
     ("scene", 10033),

@@ -3,9 +3,9 @@
 use egui::{Color32, Grid, Rect, Response, RichText, Stroke, StrokeKind, Ui, Vec2};
 
 use super::button::button;
-use super::{color_bar, map_view, overlay};
+use super::{color_bar, map_view, overlay, pixel_light};
 use crate::app::commands::Command;
-use crate::app::inspect::{Inspected, Inspector};
+use crate::app::inspect::{Inspected, Inspector, Truth};
 use crate::app::interface::{Interface, Purpose, TileView};
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
@@ -61,9 +61,14 @@ pub(in crate::app) fn show(
     theme::section(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
         Some(inspected) => {
+            measure(ui, interface, inspector, commands);
+            if let Some(truth) = inspector.truth() {
+                let misplaced = inspected.cell.map(|_| misplaced(truth, inspected));
+                pixel_light::show(ui, truth, misplaced);
+            }
             facts(ui, inspected);
             cached(ui, inspected, snapshot);
-            cell(ui, interface, inspector, inspected, (map, size), commands);
+            cell(ui, interface, inspector, inspected, (map, size));
         }
         None if interface.pinned.is_some() => {
             ui.label(theme::quiet("There is no surface here, only the map; click elsewhere."));
@@ -154,7 +159,7 @@ fn tiles(
     }
     choose_tile(ui, interface, (rect, response), size, shares);
     if !shares.is_empty() {
-        color_bar::show(ui, (MIN_SHARE, most), true, percent);
+        color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
     }
 }
 
@@ -181,7 +186,7 @@ fn choose_tile(
             "Tile {tile}: row {}, column {}\n{}",
             tile / size.0,
             tile % size.0,
-            percent(share)
+            theme::percent(share)
         ));
     }
 }
@@ -218,51 +223,24 @@ fn chosen_tile(
 ) {
     let share = shares.get(tile as usize).copied().unwrap_or(0.0);
     let place = format!("row {}, column {}", tile / columns, tile % columns);
-    ui.label(format!("Tile {tile}, {place}: {} of the map", percent(share)));
+    ui.label(format!("Tile {tile}, {place}: {} of the map", theme::percent(share)));
     let is_shown = interface.overlay == Some(crate::app::overlays::Overlay::Tile);
     if !is_shown && ui.button("Show which cells sample it").clicked() {
         interface.overlay = Some(crate::app::overlays::Overlay::Tile);
     }
 }
 
-fn cell(
+/// Asks for what is true under the pointer.
+fn measure(
     ui: &mut Ui,
     interface: &mut Interface,
     inspector: &Inspector,
-    inspected: &Inspected,
-    (map, size): (&LoadedMap, (u32, u32)),
     commands: &mut Vec<Command>,
 ) {
-    let truth = inspector.truth();
-    // One scale for both, so that they can be compared.
-    let most = truth.map_or(0.0, |truth| largest(&truth.shares));
-    let most = most.max(largest(&inspected.probabilities));
-    if !inspected.probabilities.is_empty() {
-        let (rect, response) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &inspected.probabilities, most);
-        choose_tile(ui, interface, (rect, response), size, &inspected.probabilities);
-        color_bar::show(ui, (MIN_SHARE, most), true, percent);
-        ui.label(theme::quiet("Probability of each tile, learned"));
-    }
-    if let Some(truth) = truth {
-        let (rect, response) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &truth.shares, most);
-        choose_tile(ui, interface, (rect, response), size, &truth.shares);
-        let pairs = truth.shares.iter().zip(&inspected.probabilities);
-        let distance: f32 = pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum();
-        ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
-            "Ground truth: no part of the map is visible from this point".to_owned()
-        } else {
-            format!(
-                "Ground truth (visible energy times cosine): {:.0} % of the learned probability lies elsewhere",
-                100.0 * distance
-            )
-        }));
-    }
     ui.horizontal(|ui| {
         let label = if inspector.busy { "Measuring…" } else { "Measure the truth" };
         let button = ui.add_enabled(!inspector.busy, egui::Button::new(label));
-        let hint = "Ground truth by 256 shadow rays to every tile from this point";
+        let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
         if button.on_hover_text(hint).clicked() {
             if interface.pinned.is_none() {
                 interface.pinned = interface.pointed;
@@ -273,6 +251,45 @@ fn cell(
             interface.pinned = None;
         }
     });
+}
+
+/// Share of the learned probability that lies where the truth has none.
+fn misplaced(truth: &Truth, inspected: &Inspected) -> f32 {
+    let pairs = truth.shares.iter().zip(&inspected.probabilities);
+    pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum()
+}
+
+fn cell(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    inspector: &Inspector,
+    inspected: &Inspected,
+    (map, size): (&LoadedMap, (u32, u32)),
+) {
+    let truth = inspector.truth();
+    // One scale for both, so that they can be compared.
+    let most = truth.map_or(0.0, |truth| largest(&truth.shares));
+    let most = most.max(largest(&inspected.probabilities));
+    if !inspected.probabilities.is_empty() {
+        let (rect, response) = map_view::ground(ui, map);
+        heatmap(ui, rect, size, &inspected.probabilities, most);
+        choose_tile(ui, interface, (rect, response), size, &inspected.probabilities);
+        color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
+        ui.label(theme::quiet("Probability of each tile, learned"));
+    }
+    if let Some(truth) = truth {
+        let (rect, response) = map_view::ground(ui, map);
+        heatmap(ui, rect, size, &truth.shares, most);
+        choose_tile(ui, interface, (rect, response), size, &truth.shares);
+        ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
+            "Ground truth: no part of the map is visible from this point".to_owned()
+        } else {
+            format!(
+                "Ground truth (visible energy times cosine): {:.0} % of the learned probability lies elsewhere",
+                100.0 * misplaced(truth, inspected)
+            )
+        }));
+    }
     table(ui, inspected, inspector);
 }
 
@@ -424,7 +441,7 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
             let p = inspected.probabilities[tile];
             let mut number = |text: String| ui.label(RichText::new(text).size(12.5));
             number(tile.to_string());
-            number(percent(p));
+            number(theme::percent(p));
             match inspected.tallies.get(tile) {
                 Some(tally) if tally.tries > 0.0 => {
                     number(theme::count(tally.tries as u64));
@@ -436,20 +453,11 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
                 }
             }
             if let Some(truth) = truth {
-                number(percent(truth.shares[tile]));
+                number(theme::percent(truth.shares[tile]));
             }
             ui.end_row();
         }
     });
-}
-
-fn percent(share: f32) -> String {
-    match 100.0 * share {
-        p if p >= 9.95 => format!("{p:.1} %"),
-        p if p >= 0.01 => format!("{p:.2} %"),
-        p if p > 0.0 => format!("{p:.0e} %"),
-        _ => "0 %".to_owned(),
-    }
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub(super) mod method;
 pub(super) mod needs;
 pub(super) mod overlay;
 pub(super) mod picture;
+mod pixel_light;
 pub(super) mod prompt;
 pub(super) mod right;
 pub(super) mod scope;
