@@ -72,6 +72,8 @@ pub enum Command {
     StepOverlay(isize),
     /// Show or hide the developer's panel.
     ToggleDeveloper,
+    /// Make a small picture of the next listed map that has none.
+    MakeSmallMap,
     /// Show or hide the list of keys.
     ToggleShortcuts,
     /// Close what lies over the picture, and mark no region.

@@ -147,6 +147,11 @@ impl App {
             Command::ToggleZoom => interface.toggle_zoom(document.size),
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,
+            Command::MakeSmallMap => {
+                if let Some(make) = self.library.small_maps.make_next() {
+                    self.tasks.run("small map", || Ok(TaskResult::SmallMaps(make())));
+                }
+            }
             Command::MeasureTruth => {
                 let seen = self.seen().cloned();
                 let measure = seen.and_then(|seen| self.rendering.inspector.measure(&seen));

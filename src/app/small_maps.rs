@@ -1,55 +1,76 @@
 //! Small pictures of maps, by which they are recognised in lists: kept in a folder for the next window.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
 use egui::{Context, TextureHandle, TextureOptions};
 
+use super::dropped::is_map;
 use super::screen::color_image;
 use super::settings_file::lasting_map;
 use crate::digest::Digest;
 use crate::environment::sky;
 use crate::image::ldr::decode_ldr;
-use crate::image::{Image, Rgb8, read_file, write_png};
+use crate::image::{Image, Rgb8, read_file, read_map, write_png};
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
 /// Width in pixels; they are half as high.
 const WIDTH: u32 = 96;
 /// Most files kept.
-const MAX_FILES: usize = 64;
+const MAX_FILES: usize = 512;
+/// Most maps of a folder that are listed.
+const MAX_LISTED: usize = 256;
+/// Larger files, in bytes, are not read for a small picture alone.
+const MAX_READ: u64 = 200 << 20;
 
-/// A map's name and it in small.
-pub(super) type SmallMap = (String, Rgb8);
+/// Small pictures that have been read or made.
+#[derive(Default)]
+pub(super) struct SmallMapsFound {
+    /// Maps' lasting names and they in small.
+    maps: Vec<(String, Rgb8)>,
+    /// All maps of the folder of the map that was opened, if one was.
+    listed: Option<Vec<String>>,
+    /// Whether these were made for [`SmallMaps::make_next`].
+    are_next: bool,
+}
 
 /// Small pictures of maps on the device, by their lasting names.
 pub(super) struct SmallMaps {
     folder: Option<PathBuf>,
     textures: BTreeMap<String, TextureHandle>,
+    /// Maps in the folder of the one that was opened last.
+    listed: Vec<String>,
+    /// Maps of which a picture was tried to be made.
+    tried: BTreeSet<String>,
+    /// Whether one is being made.
+    pub(super) is_busy: bool,
 }
 
 impl SmallMaps {
     /// None yet; `folder` is where they are kept, if anywhere.
     pub(super) fn new(folder: Option<PathBuf>) -> Self {
-        Self { folder, textures: BTreeMap::new() }
+        Self {
+            folder,
+            textures: BTreeMap::new(),
+            listed: Vec::new(),
+            tried: BTreeSet::new(),
+            is_busy: false,
+        }
     }
 
     /// Reads the pictures of maps that were opened lately, and makes those of built-in skies.
-    pub(super) fn read(&self, recent: Vec<String>) -> impl FnOnce() -> Vec<SmallMap> + use<> {
+    pub(super) fn read(&self, recent: Vec<String>) -> impl FnOnce() -> SmallMapsFound + use<> {
         let folder = self.folder.clone();
         move || {
             let skies = sky::names().iter().filter_map(|name| {
                 let map = sky::build(name, WIDTH, WIDTH / 2).ok()?;
                 Some((format!("sky:{name}"), in_small(&map)))
             });
-            let read = |folder: PathBuf| -> Vec<SmallMap> {
-                tidy(&folder);
-                let small = |name: String| Some((name.clone(), read_small(&folder, &name)?));
-                recent.into_iter().filter_map(small).collect()
-            };
-            let known = folder.map(read).unwrap_or_default();
-            known.into_iter().chain(skies).collect()
+            folder.iter().for_each(|folder| tidy(folder));
+            let known = read_known(folder.as_deref(), &recent);
+            SmallMapsFound { maps: known.chain(skies).collect(), ..SmallMapsFound::default() }
         }
     }
 
@@ -58,33 +79,86 @@ impl SmallMaps {
         self.textures.get(name)
     }
 
-    /// Takes a picture that is ready.
-    pub(super) fn take(&mut self, (name, small): SmallMap, context: &Context) {
-        let image = color_image(&small);
-        let texture = context.load_texture(&name, image, TextureOptions::LINEAR);
-        self.textures.insert(name, texture);
+    /// All maps in the folder of a map of this lasting name, if it was opened last.
+    pub(super) fn beside(&self, name: &str) -> &[String] {
+        if self.listed.iter().any(|listed| listed == name) { &self.listed } else { &[] }
+    }
+
+    /// Takes pictures that are ready.
+    pub(super) fn take(&mut self, found: SmallMapsFound, context: &Context) {
+        for (name, small) in found.maps {
+            let image = color_image(&small);
+            let texture = context.load_texture(&name, image, TextureOptions::LINEAR);
+            self.textures.insert(name, texture);
+        }
+        self.is_busy &= !found.are_next;
+        self.listed = found.listed.unwrap_or_else(|| std::mem::take(&mut self.listed));
     }
 
     /// Makes the picture of a map that was opened, of which `preview` is a smaller one, and writes it if that is a
-    /// recent file.
+    /// recent file. Lists the maps of its folder, too.
     pub(super) fn make(
         &self,
         name: &str,
         recent: &[String],
         preview: Arc<Image>,
-    ) -> impl FnOnce() -> SmallMap + use<> {
+    ) -> impl FnOnce() -> SmallMapsFound + use<> {
         let name = lasting_map(name);
-        let folder = self.folder.clone().filter(|_| recent.contains(&name));
+        let folder = self.folder.clone();
+        let is_kept = recent.contains(&name);
         move || {
             let small = in_small(&preview);
-            if let Some(folder) = folder {
-                // Without it the list has no picture, and no more is lost.
-                let _ = std::fs::create_dir_all(&folder);
-                let _ = write_png(&file_of(&folder, &name), &small, &[]);
-            }
-            (name, small)
+            write_small(folder.as_deref().filter(|_| is_kept), &name, &small);
+            let listed = maps_beside(&name);
+            let known = read_known(folder.as_deref(), &listed).filter(|(known, _)| *known != name);
+            let maps = known.chain([(name.clone(), small)]).collect();
+            SmallMapsFound { maps, listed: Some(listed), are_next: false }
         }
     }
+
+    /// Makes the picture of the next listed map that has none, unless one is being made.
+    pub(super) fn make_next(&mut self) -> Option<impl FnOnce() -> SmallMapsFound + use<>> {
+        let is_next =
+            |name: &&String| !self.textures.contains_key(*name) && !self.tried.contains(*name);
+        let name = self.listed.iter().filter(|_| !self.is_busy).find(is_next)?.clone();
+        self.is_busy = true;
+        self.tried.insert(name.clone());
+        let folder = self.folder.clone();
+        Some(move || {
+            let path = Path::new(&name);
+            let is_small = path.metadata().is_ok_and(|it| it.len() <= MAX_READ);
+            // What cannot be read says so when it is opened.
+            let map = is_small.then(|| read_map(path).ok()).flatten();
+            let small = map.map(|map| in_small(&map.image));
+            small.iter().for_each(|small| write_small(folder.as_deref(), &name, small));
+            let maps = small.into_iter().map(|small| (name.clone(), small)).collect();
+            SmallMapsFound { maps, listed: None, are_next: true }
+        })
+    }
+}
+
+/// Maps in the folder of this one, by name.
+fn maps_beside(name: &str) -> Vec<String> {
+    let entries = Path::new(name).parent().map(std::fs::read_dir);
+    let files = entries.into_iter().flatten().flatten().flatten().map(|entry| entry.path());
+    let names = files.filter_map(|path| Some(path.to_str()?.to_owned()));
+    let mut names: Vec<String> = names.filter(|name| is_map(name)).collect();
+    names.sort_by_key(|name| name.to_lowercase());
+    names.truncate(MAX_LISTED);
+    names
+}
+
+/// Pictures of maps that were written earlier.
+fn read_known(folder: Option<&Path>, names: &[String]) -> impl Iterator<Item = (String, Rgb8)> {
+    names.iter().filter_map(move |name| Some((name.clone(), read_small(folder?, name)?)))
+}
+
+/// Keeps a small picture for the next window.
+fn write_small(folder: Option<&Path>, name: &str, small: &Rgb8) {
+    let Some(folder) = folder else { return };
+    // Without it the list has no picture, and no more is lost.
+    let _ = std::fs::create_dir_all(folder);
+    let _ = write_png(&file_of(folder, name), small, &[]);
 }
 
 fn in_small(map: &Image) -> Rgb8 {

@@ -123,7 +123,7 @@ impl App {
             let Library { settings, small_maps, .. } = &self.library;
             let preview = Arc::clone(&map.preview);
             let make = small_maps.make(&map.name, &settings.recent_maps, preview);
-            self.tasks.write("small map", || Ok(TaskResult::SmallMaps(vec![make()])));
+            self.tasks.write("small map", || Ok(TaskResult::SmallMaps(make())));
         }
         self.assets.map = Some(map);
         self.rendering.inspector.forget();
@@ -157,10 +157,7 @@ impl App {
                     self.execute(command, context);
                 }
             }
-            TaskResult::SmallMaps(maps) => {
-                let small_maps = &mut self.library.small_maps;
-                maps.into_iter().for_each(|map| small_maps.take(map, context));
-            }
+            TaskResult::SmallMaps(found) => self.library.small_maps.take(found, context),
             TaskResult::Truth(truth) => self.rendering.inspector.take(truth),
             TaskResult::Done(sentence) => self.messages.notice(sentence),
             TaskResult::Failed(sentence) => self.messages.error(sentence),

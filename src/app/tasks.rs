@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use super::inspect::Truth;
 use super::kept_picture::KeptPicture;
-use super::small_maps::SmallMap;
+use super::small_maps::SmallMapsFound;
 use super::threads::{Wake, spawn};
 use super::worker::Reference;
 use crate::error::Result;
@@ -26,7 +26,7 @@ pub(super) enum TaskResult {
     /// Pictures that earlier windows kept.
     KeptPictures(Vec<KeptPicture>),
     /// Maps in small.
-    SmallMaps(Vec<SmallMap>),
+    SmallMaps(SmallMapsFound),
 }
 
 /// Threads for one task each, and their results.

@@ -452,6 +452,42 @@ fn the_truth_of_another_map_is_never_shown() {
     assert_ne!(measured(&mut studio), day);
 }
 
+#[test]
+fn maps_of_a_folder_are_listed_with_pictures() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    for name in ["b.exr", "a.exr"] {
+        write_picture(Path::new(&path(name)), &Image::filled(16, 8, [0.5; 3]));
+    }
+    std::fs::write(path("c.hdr"), "no map").expect("written");
+    std::fs::write(path("notes.txt"), "no map").expect("written");
+    studio.asks(Command::OpenMap(path("b.exr")));
+    let expected = ["a.exr", "b.exr", "c.hdr"].map(path);
+    let until = |studio: &mut Studio, what: &dyn Fn(&Studio) -> bool| {
+        for _ in 0..3000 {
+            if what(studio) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+            studio.frame().expect("drawn");
+        }
+        panic!("it never comes");
+    };
+    until(&mut studio, &|studio| studio.app.library.small_maps.beside(&expected[1]) == expected);
+    let has = |studio: &Studio, i: usize| studio.app.library.small_maps.of(&expected[i]).is_some();
+    assert!(!has(&studio, 0) && has(&studio, 1), "that of the open one alone");
+    studio.asks(Command::MakeSmallMap);
+    until(&mut studio, &|studio| has(studio, 0));
+    // What is no map is tried once.
+    studio.asks(Command::MakeSmallMap);
+    until(&mut studio, &|studio| !studio.app.library.small_maps.is_busy);
+    assert!(!has(&studio, 2) && studio.app.library.small_maps.make_next().is_none());
+    assert!(studio.app.messages.first_error().is_none());
+    // A built-in one has no folder.
+    assert!(studio.app.library.small_maps.beside("sky:day").is_empty());
+}
+
 /// A triangle, its positions in the file itself.
 const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],

@@ -132,7 +132,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 49),
-    ("app", 11336),
+    ("app", 11409),
     ("bench", 581),
     ("bsdf", 1417),
     ("bvh", 1352),

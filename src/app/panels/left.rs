@@ -15,7 +15,7 @@ use crate::app::document::{Document, Viewpoint};
 use crate::app::drag::{Drag, Step};
 use crate::app::interface::Interface;
 use crate::app::loader::{LoadedMap, LoadedScene};
-use crate::app::settings_file::Settings;
+use crate::app::settings_file::{Settings, lasting_map};
 use crate::app::small_maps::SmallMaps;
 use crate::app::theme;
 use crate::environment::sky;
@@ -89,7 +89,7 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
             }
         }
         let files = &sources.settings.recent_scenes;
-        recent(ui, files, &document.scene, |_| None, &mut chosen);
+        files_named(ui, "Recent", files, &document.scene, |_| None, &mut chosen);
     });
     commands.extend(chosen.map(Command::OpenScene));
     if let Some(scene) = sources.scene {
@@ -113,8 +113,9 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
     }
 }
 
-fn recent<'a>(
+fn files_named<'a>(
     ui: &mut Ui,
+    title: &str,
     list: &[String],
     current: &str,
     small: impl Fn(&str) -> Option<&'a TextureHandle>,
@@ -124,7 +125,7 @@ fn recent<'a>(
         return;
     }
     ui.separator();
-    ui.label(theme::quiet("Recent"));
+    ui.label(theme::quiet(title));
     for name in list {
         let label = named(ui, current == name, small(name), &theme::file_name(name));
         if label.on_hover_text(name).clicked() {
@@ -233,7 +234,14 @@ fn environment(
             }
         }
         let small = |name: &str| sources.small_maps.of(name);
-        recent(ui, &sources.settings.recent_maps, &document.map, small, &mut chosen);
+        let current = lasting_map(&document.map);
+        let beside = sources.small_maps.beside(&current);
+        let is_recent = |name: &String| !beside.contains(name);
+        let recent: Vec<String> =
+            sources.settings.recent_maps.iter().filter(|name| is_recent(name)).cloned().collect();
+        files_named(ui, "In its folder", beside, &current, small, &mut chosen);
+        files_named(ui, "Recent", &recent, &current, small, &mut chosen);
+        commands.push(Command::MakeSmallMap);
     });
     commands.extend(chosen.map(Command::OpenMap));
     if let Some(map) = sources.map {
