@@ -7,6 +7,7 @@ use super::document::{PictureSize, in_other_shape};
 use super::drag::Drag;
 use super::overlays::Overlay;
 use super::zoom::Zoom;
+use crate::scene::MaterialEdit;
 
 /// State of the window that is not the picture's.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +40,8 @@ pub struct Interface {
     pub material: Option<u32>,
     /// Whether it was just clicked: its settings are to come into sight.
     pub is_material_new: bool,
+    /// What a copied material looks like.
+    pub copied_material: Option<MaterialEdit>,
     /// What of the history is compared.
     pub compared: Chosen,
     /// Pixels of the screen that the whole picture fills from left to right where it fits, once it was drawn.
@@ -233,6 +236,7 @@ impl Default for Interface {
             pinned: None,
             material: None,
             is_material_new: false,
+            copied_material: None,
             compared: Chosen::default(),
             fitting_pixels: None,
             zoom: Zoom::default(),

@@ -5,9 +5,12 @@ use std::ops::RangeInclusive;
 use egui::emath::Numeric;
 use egui::{
     Align2, Color32, CornerRadius, DragValue, FontId, Margin, Pos2, Rect, Response, RichText,
-    Shape, Slider, SliderClamping, Stroke, SurrenderFocusOn, TextStyle, Ui, Vec2, Visuals, Widget,
+    Shape, Slider, SliderClamping, Stroke, SurrenderFocusOn, TextEdit, TextStyle, Ui, Vec2,
+    Visuals, Widget,
 };
 use glam::Vec3;
+
+use crate::scene::{color_of_hex, hex_of_color};
 
 /// Around the picture.
 pub(super) const BACKGROUND: Color32 = Color32::from_rgb(24, 25, 28);
@@ -172,13 +175,23 @@ pub(super) fn keys(text: &str) -> String {
 /// Width of the names of settings, in points.
 const LABEL_WIDTH: f32 = 84.0;
 
-/// A button that opens a picker of linear colours; whether another one was chosen. A picker that is only
-/// opened gives back what differs by rounding.
+/// A button that opens a picker of linear colours, and the colour as `#rrggbb` to be read, copied and typed; whether
+/// another one was chosen. A picker that is only opened gives back what differs by rounding.
 pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
-    let shown = |[r, g, b]: [f32; 3]| Color32::from(egui::Rgba::from_rgb(r, g, b));
     let mut chosen = *color;
     ui.color_edit_button_rgb(&mut chosen);
-    let is_another = shown(chosen) != shown(*color);
+    let own = hex_of_color(Vec3::from(*color));
+    let id = ui.scope_id().with("hex");
+    let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.clone());
+    let field = ui.add(TextEdit::singleline(&mut text).desired_width(74.0));
+    if field.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, text));
+    } else {
+        ui.data_mut(|data| data.remove::<String>(id));
+        let typed = color_of_hex(&format!("#{}", text.trim().trim_start_matches('#')));
+        chosen = typed.ok().filter(|_| text != own).map_or(chosen, |typed| typed.to_array());
+    }
+    let is_another = hex_of_color(Vec3::from(chosen)) != own;
     if is_another {
         *color = chosen;
     }

@@ -263,9 +263,12 @@ mod tests {
         let scene = builtin::build("office").expect("built in");
         let hidden = MaterialEdit { hidden: true, ..MaterialEdit::default() };
         let dull = MaterialEdit { roughness: Some(1.0), ..MaterialEdit::default() };
+        let (emission, opacity) = (Some(2.0), Some(0.5));
+        let lit = MaterialEdit { emission, opacity, ..MaterialEdit::default() };
         let change = |material: &Material| match material.name.as_str() {
             "wall" => hidden.apply(material),
             "oak" => dull.apply(material),
+            "ceiling" => lit.apply(material),
             _ => material.clone(),
         };
         let materials: Vec<Material> = scene.materials.iter().map(change).collect();
@@ -274,6 +277,8 @@ mod tests {
         let changed =
             before.with_looks(materials, before.scene.lights.clone()).expect("there is memory");
         assert_eq!(changed.needs, loaded.needs);
+        let lamps = [&before, &changed, &loaded].map(|world| world.lights.triangle_count());
+        assert!(lamps[1] > lamps[0] && lamps[1] == lamps[2], "{lamps:?}");
         assert_ne!(changed.needs, before.needs, "nothing was cut out before");
         let mut sees_more = 0;
         for index in 0..2000 {

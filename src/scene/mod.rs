@@ -30,6 +30,8 @@ pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use light::{PunctualKind, PunctualLight};
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};
 pub use material_edit::MaterialEdit;
+#[cfg(feature = "window")]
+pub(crate) use material_edit::{color_of_hex, hex_of_color};
 pub use medium::Medium;
 pub use options::{Lamps, Outlines, SceneOptions};
 pub use placing::Placing;

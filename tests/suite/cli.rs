@@ -165,7 +165,12 @@ fn materials_are_changed_by_name() {
         assert!(says.contains("all of it is hidden, so there is nothing to render"), "{says}");
     }
     let says = refusal("-o a.exr --material wall:shine=1", 2);
-    assert!(says.contains("shine is not color, roughness, metalness or hidden"), "{says}");
+    assert!(
+        says.contains(
+            "shine is not color, roughness, metalness, opacity, emission, emission-color or hidden"
+        ),
+        "{says}"
+    );
 }
 
 #[test]

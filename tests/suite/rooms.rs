@@ -132,7 +132,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 49),
-    ("app", 11409),
+    ("app", 11465),
     ("bench", 581),
     ("bsdf", 1417),
     ("bvh", 1352),
@@ -161,7 +161,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6661),
     ("report", 3076),
     ("sampler", 145),
-    ("scene", 10033),
+    ("scene", 10081),
     ("shaders", 6060),
     ("sources", 119),
     ("stability", 1842),

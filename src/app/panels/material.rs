@@ -1,4 +1,4 @@
-//! The material that was clicked: its colour, roughness and metalness, and whether it is there at all.
+//! The material that was clicked: what it looks like, what it emits, and whether it is there at all.
 
 use egui::{Align, RichText, Ui};
 use glam::Vec3;
@@ -40,7 +40,9 @@ pub(super) fn show(
     let (Some(number), Some(material)) = (interface.material, chosen) else { return };
     let before = document.materials.get(&number).copied().unwrap_or_default();
     let mut edit = before;
-    change(ui, &mut edit, material);
+    let now = MaterialEdit::like(&MaterialEdit { hidden: false, ..edit }.apply(material));
+    change(ui, &mut edit, now, material);
+    buttons(ui, &mut edit, now, &mut interface.copied_material);
     if std::mem::take(&mut interface.is_material_new) {
         ui.scroll_to_cursor(Some(Align::BOTTOM));
     }
@@ -54,28 +56,82 @@ pub(super) fn show(
     }
 }
 
-fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
-    let has = |texture: bool| if texture { "Multiplies the texture" } else { "" };
-    theme::row(ui, "Colour", has(material.texture(TextureSlot::BaseColor).is_some()), |ui| {
-        let mut rgb = edit.color.unwrap_or(material.base_color.truncate()).to_array();
-        if theme::color(ui, &mut rgb) {
-            edit.color = Some(Vec3::from(rgb));
-        }
+/// Draws what `edit` may change of a material that looks like `now`.
+fn change(ui: &mut Ui, edit: &mut MaterialEdit, now: MaterialEdit, material: &Material) {
+    let has = |slot| material.texture(slot).map_or("", |_| "Multiplies the texture");
+    let base = has(TextureSlot::BaseColor);
+    color(ui, ("Colour", base), &mut edit.color, now.color);
+    let surface = has(TextureSlot::MetallicRoughness);
+    for (name, hint, value, now) in [
+        ("Roughness", surface, &mut edit.roughness, now.roughness),
+        ("Metalness", surface, &mut edit.metalness, now.metalness),
+        ("Opacity", base, &mut edit.opacity, now.opacity),
+    ] {
+        let slider = |ui: &mut Ui, value: &mut f32| {
+            ui.add(theme::slider(value, 0.0..=1.0).fixed_decimals(2)).changed()
+        };
+        setting(ui, (name, hint), value, now, slider);
+    }
+    let hint = "Largest component of the radiance that its surfaces emit";
+    setting(ui, ("Emission", hint), &mut edit.emission, now.emission, |ui, value| {
+        let slider = theme::slider(value, 0.0..=MaterialEdit::MAX_EMISSION).logarithmic(true);
+        ui.add(slider.smallest_positive(0.01).max_decimals(2)).changed()
     });
-    let of_texture = has(material.texture(TextureSlot::MetallicRoughness).is_some());
-    let mut share = |name: &str, value: &mut Option<f32>, own: f32| {
-        let mut now = value.unwrap_or(own);
-        let slider = theme::slider(&mut now, 0.0..=1.0).fixed_decimals(2);
-        if theme::set(ui, name, of_texture, slider).changed() {
+    if now.emission != Some(0.0) {
+        let hint = has(TextureSlot::Emissive);
+        color(ui, ("Light colour", hint), &mut edit.emission_color, now.emission_color);
+    }
+}
+
+/// A colour of a material.
+fn color(ui: &mut Ui, words: (&str, &str), value: &mut Option<Vec3>, now: Option<Vec3>) {
+    setting(ui, words, value, now, |ui, color| {
+        let mut rgb = color.to_array();
+        let is_changed = theme::color(ui, &mut rgb);
+        *color = rgb.into();
+        is_changed
+    });
+}
+
+/// A row of a property, and once it is changed a button that takes the change back. `edit` says whether it has changed
+/// the present value.
+fn setting<T>(
+    ui: &mut Ui,
+    (name, hint): (&str, &str),
+    value: &mut Option<T>,
+    now: Option<T>,
+    edit: impl FnOnce(&mut Ui, &mut T) -> bool,
+) {
+    let Some(mut now) = now else { return };
+    theme::row(ui, name, hint, |ui| {
+        if edit(ui, &mut now) {
             *value = Some(now);
         }
-    };
-    share("Roughness", &mut edit.roughness, material.roughness);
-    share("Metalness", &mut edit.metalness, material.metallic);
+        if value.is_some() && ui.small_button("×").on_hover_text("As in the file").clicked() {
+            *value = None;
+        }
+    });
+}
+
+/// What is done with a material as a whole.
+fn buttons(
+    ui: &mut Ui,
+    edit: &mut MaterialEdit,
+    now: MaterialEdit,
+    copied: &mut Option<MaterialEdit>,
+) {
     ui.horizontal(|ui| {
         ui.checkbox(&mut edit.hidden, "Hide").on_hover_text("Invisible to the camera and to light");
-        let text = RichText::new("Reset").size(12.0);
-        if *edit != MaterialEdit::default() && ui.button(text).clicked() {
+        let small = |ui: &mut Ui, text: &str| ui.button(RichText::new(text).size(12.0));
+        if small(ui, "Copy").on_hover_text("Remember how it looks, textures aside").clicked() {
+            *copied = Some(now);
+        }
+        if let Some(copied) = copied
+            && small(ui, "Paste").on_hover_text("Look like what was copied").clicked()
+        {
+            *edit = *copied;
+        }
+        if *edit != MaterialEdit::default() && small(ui, "Reset").clicked() {
             *edit = MaterialEdit::default();
         }
     });
