@@ -179,9 +179,8 @@ const LABEL_WIDTH: f32 = 84.0;
 /// another one was chosen. A picker that is only opened gives back what differs by rounding.
 pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
     let mut chosen = *color;
-    ui.color_edit_button_rgb(&mut chosen);
+    let id = ui.color_edit_button_rgb(&mut chosen).id.with("hex");
     let own = hex_of_color(Vec3::from(*color));
-    let id = ui.scope_id().with("hex");
     let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.clone());
     let field = ui.add(TextEdit::singleline(&mut text).desired_width(74.0));
     if field.has_focus() {
@@ -323,6 +322,8 @@ pub(in crate::app) fn badges(ui: &Ui, badges: &[(Pos2, Align2, &str, Color32)]) 
 
 #[cfg(test)]
 mod tests {
+    use egui::{Event, Key, Modifiers};
+
     use super::*;
 
     #[test]
@@ -350,5 +351,31 @@ mod tests {
         }
         assert_eq!(typed("0.45", 0.4375), Some(0.45));
         assert_eq!(typed(" \u{2212}3", 70.0), Some(-3.0));
+    }
+
+    #[test]
+    fn a_colour_is_typed_into_its_own_field() {
+        let context = egui::Context::default();
+        let mut colors = [[0.5; 3], [0.25; 3]];
+        let key = |key, modifiers| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers,
+        };
+        let plain = |it| key(it, Modifiers::NONE);
+        let to_field = [vec![plain(Key::Tab)], vec![plain(Key::Tab)]];
+        let typed = [vec![key(Key::A, Modifiers::COMMAND)], vec![Event::Text("ff0000".to_owned())]];
+        let frames = to_field.into_iter().chain(typed).chain([vec![plain(Key::Enter)], vec![]]);
+        for events in frames {
+            let input = egui::RawInput { events, ..Default::default() };
+            let _ = context.run_ui(input, |ui| {
+                for rgb in &mut colors {
+                    row(ui, "Colour", "", |ui| color(ui, rgb));
+                }
+            });
+        }
+        assert_eq!(colors, [[1.0, 0.0, 0.0], [0.25; 3]]);
     }
 }

@@ -83,6 +83,9 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, now: MaterialEdit, material: &Ma
     }
 }
 
+/// What sliders leave to the button that takes a change back, in points.
+const WIDTH_OF_RESET: f32 = 22.0;
+
 /// A colour of a material.
 fn color(ui: &mut Ui, words: (&str, &str), value: &mut Option<Vec3>, now: Option<Vec3>) {
     setting(ui, words, value, now, |ui, color| {
@@ -104,6 +107,7 @@ fn setting<T>(
 ) {
     let Some(mut now) = now else { return };
     theme::row(ui, name, hint, |ui| {
+        ui.spacing_mut().slider_width -= WIDTH_OF_RESET;
         if edit(ui, &mut now) {
             *value = Some(now);
         }
