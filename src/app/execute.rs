@@ -186,7 +186,7 @@ impl App {
 
     /// Takes the settings that a kept picture was made with.
     fn set_as_kept(&mut self, index: usize) {
-        let Some(kept) = self.library.history.get(index) else { return };
+        let Some(kept) = self.library.history.list.get(index) else { return };
         let mut document = kept.document.clone();
         let now = &self.edited.document;
         // Those kept since are no part of the picture, and would be lost.

@@ -72,19 +72,15 @@ impl History {
         small: &Rgb8,
     ) -> (usize, Result<()>) {
         self.count = self.count.saturating_add(1);
-        let name = format!("Picture {}", self.count);
-        let pixels = Arc::new(Pixels::new(Arc::clone(image)));
-        let of_scene = self.of_scene.clone();
-        let (preview, texture, file) = (color_image(small), None, None);
         let kept = KeptPicture {
-            name,
+            name: format!("Picture {}", self.count),
             summary,
-            pixels,
+            pixels: Arc::new(Pixels::new(Arc::clone(image))),
             document,
-            of_scene,
-            small: preview,
-            texture,
-            file,
+            of_scene: self.of_scene.clone(),
+            small: color_image(small),
+            texture: None,
+            file: None,
         };
         let mut write = |album: &mut Album| album.write(&kept, small);
         let (file, failure) = match self.album.as_mut().map(&mut write).transpose() {
@@ -101,11 +97,6 @@ impl History {
     /// Whether something else was asked of a picture's scene than in this window.
     pub(crate) fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
         kept.of_scene != self.of_scene
-    }
-
-    /// One of them.
-    pub(crate) fn get(&self, index: usize) -> Option<&KeptPicture> {
-        self.list.get(index)
     }
 
     /// Drops one, and its file.
@@ -130,9 +121,9 @@ mod tests {
             history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
         }
         assert_eq!(history.list.len(), MAX_PICTURES);
-        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
+        assert_eq!(history.list[0].name, "Picture 2");
         history.remove(0);
-        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
+        assert_eq!(history.list[0].name, "Picture 3");
     }
     #[test]
     fn what_earlier_windows_kept_comes_first_and_the_oldest_file_goes() {
