@@ -109,13 +109,10 @@ impl App {
                 let said = said.into_iter().filter(|_| is_last);
                 said.for_each(|sentence| self.messages.notice(sentence));
             }
-            Command::Undo => {
-                if let Some(document) = self.edited.before() {
-                    self.go_to(document);
-                }
-            }
-            Command::Redo => {
-                if let Some(document) = self.edited.after() {
+            Command::Undo | Command::Redo => {
+                let is_undo = command == Command::Undo;
+                let found = if is_undo { self.edited.before() } else { self.edited.after() };
+                if let Some(document) = found {
                     self.go_to(document);
                 }
             }
