@@ -323,7 +323,12 @@ fn the_sun_is_put_where_it_is_asked_for_and_marked_there() {
     let Some(mut studio) = studio("living-room") else { return };
     let sunlit = |studio: &mut Studio| -> f32 {
         studio.settle().expect("rendered");
-        let legend = studio.app.display.shown.as_ref().and_then(|shown| shown.legend.clone());
+        let legend = studio
+            .app
+            .display
+            .shown
+            .as_ref()
+            .and_then(|shown| Some(shown.painted.as_ref()?.legend.clone()));
         let Some(Legend::Names(names)) = legend else { panic!("no names: {legend:?}") };
         let percent = names[0].1.strip_prefix("sunlit, ").and_then(|it| it.split_once(' '));
         percent.expect("a share").0.parse().expect("a number")
