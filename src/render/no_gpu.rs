@@ -10,7 +10,6 @@ use crate::bvh::Ray;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::camera::CameraRays;
 use crate::path::{Lit, World};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
@@ -123,14 +122,7 @@ pub(super) struct Advance {
 pub(crate) enum Renderer {}
 
 impl Renderer {
-    pub(crate) fn new(
-        uploaded: &UploadedScene,
-        _: Lit<'_>,
-        _: &View,
-        _: &CameraRays,
-        _: Option<&Film>,
-        _: bool,
-    ) -> Result<Self> {
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View, _: bool) -> Result<Self> {
         match *uploaded {}
     }
 }

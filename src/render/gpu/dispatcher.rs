@@ -22,7 +22,6 @@ use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::Lit;
-use crate::path::camera::CameraRays;
 use crate::scene::needs::SceneFeatures;
 
 /// Tiles of a dispatch that keep a software device's cores busy.
@@ -54,7 +53,6 @@ impl Dispatcher {
         uploaded: &UploadedScene,
         (world, environment): Lit<'_>,
         view: &View,
-        rays: &CameraRays,
     ) -> Result<Self> {
         features::check(view)?;
         let mut features = Features::of(world, environment, view);
@@ -66,7 +64,7 @@ impl Dispatcher {
         }
         let mut buffers = uploaded.buffers.for_renderer();
         let mut globals = uploaded.globals;
-        globals.set_view(view, rays);
+        globals.set_view(view, &view.rays());
         globals.set_fog(view.fog(world).as_ref());
         let mut constants = uploaded.constants;
         upload_tables(&mut buffers, view, environment, features, &mut constants)?;

@@ -157,8 +157,7 @@ mod tests {
         grid: Option<&LightGrid>,
     ) -> Film {
         let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
-        let rays = view.rays();
-        let renderer = Renderer::new(&uploaded, (world, environment), view, &rays, None, true);
+        let renderer = Renderer::new(&uploaded, (world, environment), view, true);
         let mut renderer = renderer.expect("it fits");
         if let Rendering::Queue(queue) = &mut renderer.rendering {
             queue.groups = 7;
