@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::film::Film;
-use super::{Pass, View};
+use super::{Advance, Pass, View};
 use crate::bvh::Ray;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -111,12 +111,6 @@ impl KernelFacts {
 
 /// The film on a device.
 pub(crate) enum DeviceFilm {}
-
-/// What a call of [`Renderer::render`] has set going.
-pub(super) struct Advance {
-    pub(super) samples: u64,
-    pub(super) least: u32,
-}
 
 /// What a device holds of a picture in the making.
 pub(crate) enum Renderer {}

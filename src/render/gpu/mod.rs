@@ -44,7 +44,7 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 
 use super::film::Film;
-use super::{Pass, View};
+use super::{Advance, Pass, View};
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::Lit;
@@ -72,7 +72,6 @@ pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
 pub(crate) use film::DeviceFilm;
-pub(super) use progress::Advance;
 pub use uploaded_scene::UploadedScene;
 
 /// How kernels share the work of a picture.
