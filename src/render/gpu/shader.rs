@@ -440,6 +440,7 @@ fn keep_lines(text: &str, features: Features, source: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::super::device::MAX_STORAGE_BUFFERS;
+    use super::super::features::KernelFeatures;
     use super::*;
 
     #[test]
@@ -656,7 +657,8 @@ mod tests {
             }
             validate(Kernel::ClosestHits, features, places);
             validate(Kernel::ShadowRays, features, places);
-            validate(Kernel::Render, features.with_hardware_rays(), places);
+            let with_rays = Features { kernel: KernelFeatures::HARDWARE_RAYS, ..features };
+            validate(Kernel::Render, with_rays, places);
         }
     }
 }
