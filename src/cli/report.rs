@@ -247,17 +247,15 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
     let cancel = kept("stopping; what is measured is kept");
     tell(estimate(plan));
     let progress = Progress::start("starting");
-    let made = make(
-        plan,
-        &Options {
-            folder: &folder,
-            references: arguments.references.as_deref(),
-            adapter: arguments.adapter.as_deref(),
-            cancel: &cancel.asked,
-            progress: &|what| progress.say(what),
-            tell: &|what| progress.tell(&what),
-        },
-    );
+    let options = Options {
+        folder: &folder,
+        references: arguments.references.as_deref(),
+        adapter: arguments.adapter.as_deref(),
+        cancel: &cancel.asked,
+        progress: &|what| progress.say(what),
+        tell: &|what| progress.tell(&what),
+    };
+    let made = make(plan, &options);
     progress.finish();
     finish(&made?, &folder)
 }
