@@ -35,7 +35,7 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     write_text(&folder.join("report.html"), &page.html()?)
 }
 
-fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_beside_and_rename(path, |file| file.write_all(text.as_bytes()))
 }
 
