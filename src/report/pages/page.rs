@@ -6,7 +6,7 @@ use super::super::plan::{Device, Method};
 use super::super::statistics::SpeedUp;
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::pictures::{Window, data_uri, developed};
-use super::plots::{Group, error_plot, rendered, speed_up_plot};
+use super::plots::{Bar, Group, error_plot, rendered, speed_up_plot};
 use super::{format, results};
 use crate::error::Result;
 
@@ -55,7 +55,7 @@ impl<'a> Page<'a> {
         let ablations = if report.is_long() { ablations(report) } else { Vec::new() };
         let overview = if report.is_long() {
             let mean = |(index, line): (usize, &AblationLine<'a>)| {
-                Some(Group::of_method(&line.method.name, index, line.mean?, None))
+                Some(Group::of_method(Bar::new(&line.method.name, index, line.mean?, None)))
             };
             let groups = ablations.iter().enumerate().filter_map(mean).collect();
             speed_up_plot("Geometric mean over all rows", report.last_baseline(), groups)
@@ -123,7 +123,8 @@ impl<'a> Section<'a> {
         for device in &row.devices {
             let group = |(index, m): (usize, &'a MethodReport)| {
                 let found = m.speed_up(report.last_baseline(), Measure::TrimmedRelMse)?;
-                Some(Group::of_method(&m.method.name, index, found.ratio, found.interval))
+                let bar = Bar::new(&m.method.name, index, found.ratio, found.interval);
+                Some(Group::of_method(bar))
             };
             let groups = device.methods.iter().enumerate().filter_map(group).collect();
             let plot = speed_up_plot(device.device.title(), report.last_baseline(), groups);
