@@ -48,14 +48,14 @@ pub struct Environment {
     grid: TileGrid,
     table: Arc<Table>,
     tile_energies: Vec<f64>,
-    patches: PatchRows,
+    pub(crate) patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
-    importance_scale: f32,
+    pub(crate) importance_scale: f32,
     /// The pixels' importance, scaled by `importance_scale`. Placing a sample needs only these, a third of the
     /// pixels' size; most samples are occluded and need no radiance.
     importances: Arc<Vec<f32>>,
     /// One over each tile's energy in the same scale; 0 where f32 overflows.
-    inverse_energies: Vec<f32>,
+    pub(crate) inverse_energies: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
     map_mean: Vec3,
     map_is_black: bool,
@@ -334,16 +334,6 @@ impl Environment {
     /// Rotation in turns, in `[0,1)`, and the factor on all radiance.
     pub(crate) fn rotation_and_intensity(&self) -> (f32, f32) {
         (self.rotation_turns, self.intensity)
-    }
-
-    /// Rows of patches.
-    pub(crate) fn patches(&self) -> &PatchRows {
-        &self.patches
-    }
-
-    /// Factor on importance, and one over each tile's energy so scaled.
-    pub(crate) fn importance_scale(&self) -> (f32, &[f32]) {
-        (self.importance_scale, &self.inverse_energies)
     }
 
     /// Memory of the pixels and of the table.

@@ -111,7 +111,7 @@ impl UploadedScene {
         if features.scene_lights() {
             let lights = layout::light_words(world, globals);
             put_array(buffers, "lights", "the list of lights", &lights)?;
-            put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
+            put_array(buffers, "light_nodes", "the tree of lights", &world.lights.tree.nodes)?;
         }
         self.constants = Constants {
             stack_size,
