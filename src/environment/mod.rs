@@ -264,12 +264,12 @@ impl Environment {
 
     /// Columns and rows of patches.
     pub fn patch_grid(&self) -> (u32, u32) {
-        (self.map.width, self.patches.rows().len() as u32)
+        (self.map.width, self.patches.rows.len() as u32)
     }
 
     /// Steradians of a patch of a row.
     pub fn patch_solid_angle(&self, row: u32) -> f32 {
-        self.patches.rows()[row as usize].solid_angle
+        self.patches.rows[row as usize].solid_angle
     }
 
     /// Unit world direction of a place in the patch of this column and row, `within` in `[0,1]`^2 of
@@ -370,7 +370,7 @@ impl Environment {
 
     /// Scaled energy of a patch of row `y` with corners of these importances.
     fn patch_energy(&self, corners: Corners<f32>, y: u32) -> f32 {
-        0.25 * corners.iter().sum::<f32>() * self.patches.rows()[y as usize].solid_angle
+        0.25 * corners.iter().sum::<f32>() * self.patches.rows[y as usize].solid_angle
     }
 
     /// Whether both are one map with one table, turned or scaled differently.
@@ -387,7 +387,7 @@ impl Environment {
         let x = u * width as f32 + patches::SHIFT;
         // Never negative; `floor` is a call where a machine need not have the instruction.
         let left = x as u32;
-        let rows = self.patches.rows().len() as u32;
+        let rows = self.patches.rows.len() as u32;
         let row = ((uv.y * self.map.height as f32 + patches::SHIFT) as u32).min(rows - 1);
         let squared_sine = direction.x * direction.x + direction.z * direction.z;
         MapPoint {

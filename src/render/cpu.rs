@@ -192,7 +192,7 @@ impl Task<'_> {
         if self.cancel.load(Ordering::Relaxed) || film.pixels().all(|(_, p)| p.samples() > sample) {
             return (0, 0);
         }
-        let corner = film.corner();
+        let corner = film.corner;
         let starts: Vec<Start<'_>> = film
             .pixels()
             .map(|(at, _)| {

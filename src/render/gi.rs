@@ -91,7 +91,7 @@ impl CacheTraining {
         if paths < self.end() && !self.sums.is_full() {
             return paths;
         }
-        let cells = *self.sums.cells();
+        let cells = self.sums.cells;
         let cache = self.sums.cache();
         let cells = match &cache {
             Some(_) if self.cache.is_some() => None,
@@ -110,7 +110,7 @@ impl CacheTraining {
 
     /// Whether its cells are as large as those for a camera at `position` would be, or nearly so.
     pub(crate) fn suits(&self, position: Vec3) -> bool {
-        let cells = self.sums.cells();
+        let cells = &self.sums.cells;
         position.distance(cells.center) < cells.least_distance
     }
 
@@ -121,7 +121,7 @@ impl CacheTraining {
 
     /// Tells what [`Self::facts`] are of: paths that have trained it, and edge of the smallest cells.
     pub(crate) fn state(&self) -> (u64, f32) {
-        (self.paths, self.sums.cells().edge)
+        (self.paths, self.sums.cells.edge)
     }
 
     /// What is known so far.
@@ -207,8 +207,8 @@ pub(super) mod tests {
         let (world, environment, view) = office();
         let mut training =
             CacheTraining::new((&world, &environment), &view).expect("there is light");
-        let edge = training.sums.cells().edge;
-        let cells = CacheCells { edge: edge / 64.0, ..*training.sums.cells() };
+        let edge = training.sums.cells.edge;
+        let cells = CacheCells { edge: edge / 64.0, ..training.sums.cells };
         training.sums = RadianceSums::new(cells, 1.0);
         training.begin(&view, 0, 1);
         let mut places = 0;
@@ -217,7 +217,7 @@ pub(super) mod tests {
             for place in 4 * range.start..4 * range.end {
                 let [x, z] = [place % 256, place / 256].map(|at| at as f32 * 0.02 * edge);
                 let sums = training.sums();
-                sums.add(sums.cells().center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
+                sums.add(sums.cells.center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
                 places += 1;
             }
             training.advance(range.end);

@@ -491,7 +491,7 @@ pub(super) fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
 
 /// Rows of the map's patches, then one over each tile's energy.
 pub(crate) fn map_rows(environment: &Environment) -> impl Iterator<Item = [f32; 4]> {
-    let rows = environment.patches.rows().iter();
+    let rows = environment.patches.rows.iter();
     let energies = environment.inverse_energies.iter();
     rows.map(|row| [row.top, row.extent, row.solid_angle, 0.0])
         .chain(energies.map(|inverse| [*inverse, 0.0, 0.0, 0.0]))

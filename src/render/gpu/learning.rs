@@ -37,7 +37,7 @@ pub(super) fn train(
     cancel: &AtomicBool,
 ) -> Result<(u64, u64)> {
     let (words, scale) = sums.words_and_scale();
-    on.globals.set_cells_of_cache(sums.cells(), scale);
+    on.globals.set_cells_of_cache(&sums.cells, scale);
     on.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
     let done = trace_anywhere(on, Kernel::Train, paths, cancel)?;
     sums.set_words(&on.read_words("cache_sums", words.len())?);

@@ -236,12 +236,12 @@ impl Renderer {
         if !on.features.view.contains(ViewFeatures::RADIANCE_CACHE) {
             return Ok(());
         }
-        let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
         on.globals.cache_is_known = u32::from(cache.is_some());
-        on.globals.cache_mean = mean;
+        on.globals.cache_mean = cache.map_or(Vec3::ZERO, |cache| cache.mean);
         if let Some(cache) = cache {
             on.globals.set_cells_of_cache(cache.cells(), on.globals.cache_scale);
         }
+        let slots = cache.map_or(&[][..], |cache| &cache.slots);
         let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };
         put_array(&mut on.buffers, "cache_slots", "the radiance cache", slots)?;
         on.write_globals();
