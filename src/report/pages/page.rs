@@ -6,7 +6,7 @@ use super::super::plan::{Device, Method};
 use super::super::statistics::SpeedUp;
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::pictures::{Window, data_uri, developed};
-use super::plots::{Bar, Group, error_plot, rendered, speed_up_plot};
+use super::plots::{Bar, Group, error_plot, speed_up_plot};
 use super::{format, results};
 use crate::error::Result;
 
@@ -16,9 +16,9 @@ use crate::error::Result;
 pub(super) struct Page<'a> {
     report: &'a Report,
     /// The plot above all rows.
-    overview: Option<String>,
+    pub(super) overview: Option<String>,
     ablations: Vec<AblationLine<'a>>,
-    sections: Vec<Section<'a>>,
+    pub(super) sections: Vec<Section<'a>>,
 }
 
 /// A method's speed-ups over the last baseline.
@@ -33,9 +33,9 @@ struct AblationLine<'a> {
 }
 
 /// What is shown of a row.
-struct Section<'a> {
-    row: &'a RowReport,
-    error_plots: Vec<(Device, String)>,
+pub(super) struct Section<'a> {
+    pub(super) row: &'a RowReport,
+    pub(super) error_plots: Vec<(Device, String)>,
     /// Plots on the page.
     plots: Vec<String>,
     pictures: Option<Pictures<'a>>,
@@ -68,23 +68,6 @@ impl<'a> Page<'a> {
         let sections =
             report.rows.iter().map(|row| Section::new(report, row)).collect::<Result<_>>()?;
         Ok(Self { report, overview: overview?, ablations, sections })
-    }
-
-    /// The plot of all rows' speed-ups.
-    pub(super) fn overview_plot(&self) -> Option<&str> {
-        self.overview.as_deref().filter(|_| !self.report.is_long())
-    }
-
-    /// Error against time, of each row and device.
-    pub(super) fn error_plots(&self) -> impl Iterator<Item = (&RowReport, Device, &str)> {
-        self.sections.iter().flat_map(|section| {
-            section.error_plots.iter().map(|(device, plot)| (section.row, *device, plot.as_str()))
-        })
-    }
-
-    /// The whole page.
-    pub(super) fn html(&self) -> Result<String> {
-        rendered(self)
     }
 }
 
