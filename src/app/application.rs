@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::album::Album;
 use super::assets::Assets;
 use super::commands::{self, Command};
 use super::desktop::Desktop;
@@ -100,10 +101,11 @@ impl App {
         let mut history = History::new(start.of_scene);
         if let Some(folder) = start.pictures {
             let report = tasks.reporter();
-            history = history.of_folder(folder, move |found| {
+            let album = Album::open(folder, move |found| {
                 let failed = |error: Error| TaskResult::Failed(error.to_string());
                 report(found.map_or_else(failed, TaskResult::KeptPictures));
             })?;
+            history.album = Some(album);
         }
         let small_maps = SmallMaps::new(start.small_maps);
         let read = small_maps.read(start.settings.recent_maps.clone());

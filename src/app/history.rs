@@ -1,6 +1,5 @@
 //! Pictures kept for comparison.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::album::Album;
@@ -17,7 +16,8 @@ pub(crate) struct History {
     /// All of them.
     pub(crate) list: Vec<KeptPicture>,
     count: u32,
-    album: Option<Album>,
+    /// The folder that keeps them for the next window.
+    pub(super) album: Option<Album>,
     /// What is asked of the files of scenes.
     of_scene: SceneOptions,
 }
@@ -26,19 +26,6 @@ impl History {
     /// Of a window in which so much is asked of the files of scenes.
     pub(crate) fn new(of_scene: SceneOptions) -> Self {
         Self { of_scene, ..Self::default() }
-    }
-
-    /// With a folder for the next window's sake; `report` is told what earlier ones left there, for
-    /// [`Self::take_over`], and later what fails.
-    ///
-    /// # Errors
-    /// If the system gives no thread.
-    pub(crate) fn of_folder(
-        self,
-        folder: PathBuf,
-        report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
-    ) -> Result<Self> {
-        Ok(Self { album: Some(Album::open(folder, report)?), ..self })
     }
 
     /// Waits until everything is written.
@@ -133,10 +120,11 @@ mod tests {
             let report = move |kept| {
                 let _ = sender.send(kept);
             };
-            let history = History::default().of_folder(temporary.path().to_owned(), report);
+            let album = Album::open(temporary.path().to_owned(), report).expect("a thread");
+            let history = History { album: Some(album), ..History::default() };
             let minute = std::time::Duration::from_secs(60);
             let earlier = found.recv_timeout(minute).expect("an answer").expect("read");
-            (history.expect("a thread"), earlier)
+            (history, earlier)
         };
         let keep = |history: &mut History| {
             let image = Arc::new(Image::filled(1, 1, [0.5; 3]));
