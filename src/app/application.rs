@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::album::Album;
 use super::assets::Assets;
 use super::commands::{self, Command};
 use super::desktop::Desktop;
@@ -14,6 +15,7 @@ use super::interface::{Dock, Interface, Tab};
 use super::library::Library;
 use super::loader::Loader;
 use super::messages::Messages;
+use super::panels::controls::Controls;
 use super::reload::Reload;
 use super::rendering::Rendering;
 use super::save::Saves;
@@ -99,10 +101,11 @@ impl App {
         let mut history = History::new(start.of_scene);
         if let Some(folder) = start.pictures {
             let report = tasks.reporter();
-            history = history.of_folder(folder, move |found| {
+            let album = Album::open(folder, move |found| {
                 let failed = |error: Error| TaskResult::Failed(error.to_string());
                 report(found.map_or_else(failed, TaskResult::KeptPictures));
             })?;
+            history.album = Some(album);
         }
         let small_maps = SmallMaps::new(start.small_maps);
         let read = small_maps.read(start.settings.recent_maps.clone());
@@ -215,30 +218,32 @@ impl App {
 
     /// The panels beside the picture.
     fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let document = &mut self.edited.document;
         let map = self.assets.map.as_ref();
         let sources = panels::left::Sources {
             // While another one is read, nothing is to be chosen in the one that is shown.
-            scene: self.assets.scene_of(document),
+            scene: self.assets.scene_of(&self.edited.document),
             map,
             settings: &self.library.settings,
             small_maps: &self.library.small_maps,
         };
-        if !theme::is_small(ui) {
-            panels::left::show(ui, document, &mut self.interface, sources, commands);
-        }
-        let exposure_ev = self.display.exposure_ev(document);
+        let exposure_ev = self.display.exposure_ev(&self.edited.document);
         let history = &mut self.library.history;
-        panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
-            Tab::Scene => panels::left::sections(ui, document, interface, sources, commands),
+        let (document, interface) = (&mut self.edited.document, &mut self.interface);
+        let mut controls = Controls { document, interface, commands };
+        if !theme::is_small(ui) {
+            panels::left::show(ui, &mut controls, sources);
+        }
+        panels::right::show(ui, &mut controls, |ui, controls| match controls.interface.tab {
+            Tab::Scene => panels::left::sections(ui, controls, sources),
             Tab::Picture => {
                 let cut_off = self.rendering.snapshot.as_ref().and_then(|s| s.cut_off.as_deref());
-                panels::picture::show(ui, document, (exposure_ev, cut_off), commands);
-                panels::history::show(ui, history, &mut interface.compared, commands);
+                panels::picture::show(ui, controls, (exposure_ev, cut_off));
+                panels::history::show(ui, controls, history);
             }
             Tab::Inspect => {
                 let Rendering { inspector, snapshot, .. } = &self.rendering;
-                panels::method::show(ui, &mut document.light, commands);
+                panels::method::show(ui, controls);
+                let Controls { interface, commands, .. } = controls;
                 panels::overlay::show(ui, interface, self.display.shown.as_deref());
                 let snapshot = snapshot.as_deref();
                 panels::inspector::show(ui, interface, inspector, map, snapshot, commands);

@@ -86,7 +86,7 @@ impl Assets {
         match self.scene.as_ref().filter(|scene| scene.name == document.scene) {
             None => self.loader.load_scene(&document.scene),
             Some(scene) if !scene.is_edited_as(document) => {
-                self.loader.edit_scene(scene, &document.materials, document.lamps);
+                self.loader.edit_scene(scene, document);
             }
             Some(_) => {}
         }

@@ -56,8 +56,8 @@ pub(super) struct Compared {
 impl Comparison {
     /// Of what was chosen of the kept pictures, if anything.
     pub(super) fn new(chosen: Chosen, history: &History) -> Option<Self> {
-        let left = history.get(chosen.left?)?;
-        let right = chosen.right.and_then(|right| history.get(right));
+        let left = history.list.get(chosen.left?)?;
+        let right = chosen.right.and_then(|right| history.list.get(right));
         let name = right.map_or("Now", |kept| &kept.name).to_owned();
         Some(Self {
             names: [left.name.clone(), name],

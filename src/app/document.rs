@@ -28,7 +28,6 @@ pub struct Document {
     /// Factor on the radiance of the map's sun alone.
     pub sun: f32,
     /// Factor on the scene's point, spot and directional lights.
-    #[serde(default = "one")]
     pub lamps: f32,
     /// What the camera sees of the map.
     pub background: Background,
@@ -124,7 +123,7 @@ impl Default for Document {
             rotation_degrees: 0.0,
             intensity: 1.0,
             sun: 1.0,
-            lamps: one(),
+            lamps: 1.0,
             background: Background::default(),
             fog: None,
             viewpoint: None,
@@ -151,10 +150,6 @@ impl Default for Document {
             materials: BTreeMap::new(),
         }
     }
-}
-
-fn one() -> f32 {
-    1.0
 }
 
 impl Document {

@@ -109,13 +109,10 @@ impl App {
                 let said = said.into_iter().filter(|_| is_last);
                 said.for_each(|sentence| self.messages.notice(sentence));
             }
-            Command::Undo => {
-                if let Some(document) = self.edited.before() {
-                    self.go_to(document);
-                }
-            }
-            Command::Redo => {
-                if let Some(document) = self.edited.after() {
+            Command::Undo | Command::Redo => {
+                let is_undo = command == Command::Undo;
+                let found = if is_undo { self.edited.before() } else { self.edited.after() };
+                if let Some(document) = found {
                     self.go_to(document);
                 }
             }
@@ -191,7 +188,7 @@ impl App {
 
     /// Takes the settings that a kept picture was made with.
     fn set_as_kept(&mut self, index: usize) {
-        let Some(kept) = self.library.history.get(index) else { return };
+        let Some(kept) = self.library.history.list.get(index) else { return };
         let mut document = kept.document.clone();
         let now = &self.edited.document;
         // Those kept since are no part of the picture, and would be lost.

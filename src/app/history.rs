@@ -1,6 +1,5 @@
 //! Pictures kept for comparison.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::album::Album;
@@ -17,7 +16,8 @@ pub(crate) struct History {
     /// All of them.
     pub(crate) list: Vec<KeptPicture>,
     count: u32,
-    album: Option<Album>,
+    /// The folder that keeps them for the next window.
+    pub(super) album: Option<Album>,
     /// What is asked of the files of scenes.
     of_scene: SceneOptions,
 }
@@ -26,19 +26,6 @@ impl History {
     /// Of a window in which so much is asked of the files of scenes.
     pub(crate) fn new(of_scene: SceneOptions) -> Self {
         Self { of_scene, ..Self::default() }
-    }
-
-    /// With a folder for the next window's sake; `report` is told what earlier ones left there, for
-    /// [`Self::take_over`], and later what fails.
-    ///
-    /// # Errors
-    /// If the system gives no thread.
-    pub(crate) fn of_folder(
-        self,
-        folder: PathBuf,
-        report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
-    ) -> Result<Self> {
-        Ok(Self { album: Some(Album::open(folder, report)?), ..self })
     }
 
     /// Waits until everything is written.
@@ -72,19 +59,15 @@ impl History {
         small: &Rgb8,
     ) -> (usize, Result<()>) {
         self.count = self.count.saturating_add(1);
-        let name = format!("Picture {}", self.count);
-        let pixels = Arc::new(Pixels::new(Arc::clone(image)));
-        let of_scene = self.of_scene.clone();
-        let (preview, texture, file) = (color_image(small), None, None);
         let kept = KeptPicture {
-            name,
+            name: format!("Picture {}", self.count),
             summary,
-            pixels,
+            pixels: Arc::new(Pixels::new(Arc::clone(image))),
             document,
-            of_scene,
-            small: preview,
-            texture,
-            file,
+            of_scene: self.of_scene.clone(),
+            small: color_image(small),
+            texture: None,
+            file: None,
         };
         let mut write = |album: &mut Album| album.write(&kept, small);
         let (file, failure) = match self.album.as_mut().map(&mut write).transpose() {
@@ -101,11 +84,6 @@ impl History {
     /// Whether something else was asked of a picture's scene than in this window.
     pub(crate) fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
         kept.of_scene != self.of_scene
-    }
-
-    /// One of them.
-    pub(crate) fn get(&self, index: usize) -> Option<&KeptPicture> {
-        self.list.get(index)
     }
 
     /// Drops one, and its file.
@@ -130,9 +108,9 @@ mod tests {
             history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
         }
         assert_eq!(history.list.len(), MAX_PICTURES);
-        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
+        assert_eq!(history.list[0].name, "Picture 2");
         history.remove(0);
-        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
+        assert_eq!(history.list[0].name, "Picture 3");
     }
     #[test]
     fn what_earlier_windows_kept_comes_first_and_the_oldest_file_goes() {
@@ -142,10 +120,11 @@ mod tests {
             let report = move |kept| {
                 let _ = sender.send(kept);
             };
-            let history = History::default().of_folder(temporary.path().to_owned(), report);
+            let album = Album::open(temporary.path().to_owned(), report).expect("a thread");
+            let history = History { album: Some(album), ..History::default() };
             let minute = std::time::Duration::from_secs(60);
             let earlier = found.recv_timeout(minute).expect("an answer").expect("read");
-            (history.expect("a thread"), earlier)
+            (history, earlier)
         };
         let keep = |history: &mut History| {
             let image = Arc::new(Image::filled(1, 1, [0.5; 3]));

@@ -208,14 +208,10 @@ impl Loader {
         self.spawn(Kind::Scene, name, false, move || Loaded::Scene(load_scene(&own, &options)));
     }
 
-    /// Starts to change the materials and lights of a scene that is there, unless something is being done to it.
-    pub fn edit_scene(
-        &mut self,
-        scene: &LoadedScene,
-        edits: &BTreeMap<u32, MaterialEdit>,
-        lamps: f32,
-    ) {
-        let (own, edits) = (scene.clone(), edits.clone());
+    /// Starts to change the materials and lights of a scene that is there to what the document wants, unless something
+    /// is being done to it.
+    pub fn edit_scene(&mut self, scene: &LoadedScene, document: &Document) {
+        let (own, edits, lamps) = (scene.clone(), document.materials.clone(), document.lamps);
         self.spawn(Kind::Scene, &scene.name, true, move || {
             Loaded::Edited(own.edited(edits, lamps))
         });

@@ -24,7 +24,7 @@ pub(crate) struct Message {
 /// What is to be said, newest last.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Messages {
-    list: Vec<Message>,
+    pub(crate) list: Vec<Message>,
 }
 
 impl Messages {
@@ -73,11 +73,6 @@ impl Messages {
         }
     }
 
-    /// The messages, to be drawn and closed.
-    pub(crate) fn list(&mut self) -> &mut Vec<Message> {
-        &mut self.list
-    }
-
     /// The oldest error.
     pub(crate) fn first_error(&self) -> Option<&str> {
         self.list.iter().find(|m| m.is_error).map(|m| m.sentence.as_str())
@@ -89,7 +84,7 @@ mod tests {
     use super::*;
 
     fn said(messages: &mut Messages) -> Vec<String> {
-        messages.list().iter().map(|message| message.sentence.clone()).collect()
+        messages.list.iter().map(|message| message.sentence.clone()).collect()
     }
 
     #[test]

@@ -9,10 +9,10 @@ use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
 use super::tasks::{TaskResult, Tasks};
 use super::worker::Snapshot;
-use crate::error::{Notices, Result};
+use crate::error::Result;
 use crate::image::check_writable;
 use crate::output::record::{Phases, Record, settings_of};
-use crate::output::{Exposure, Films, LayerName, PictureOptions, write_picture};
+use crate::output::{self, Exposure, Films, LayerName, PictureOptions, write_picture};
 
 /// What a picture is written from.
 pub(super) struct Picture {
@@ -52,11 +52,12 @@ impl Saves {
             let picture = Arc::clone(&picture);
             tasks.write("save", move || {
                 write(&path, &picture)?;
-                let film = &picture.snapshot.main.film;
+                let snapshot = &picture.snapshot;
+                let (film, map) = (&snapshot.main.film, &snapshot.request.environment);
                 let (path, width, height) = (path.display(), film.width, film.height);
                 let saved = format!("Saved {path}, {width} x {height} pixels");
-                let remarks = remarks(&picture);
-                let sentence = remarks.iter().fold(saved, |all, remark| format!("{all}; {remark}"));
+                let remarks = output::remarks(film, map).into_iter();
+                let sentence = remarks.fold(saved, |all, remark| format!("{all}; {remark}"));
                 Ok(TaskResult::Done(sentence))
             });
         }
@@ -105,21 +106,15 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
     };
     // As it is shown. RGB of linear pictures is exact.
     let cached = snapshot.backdrop.as_ref().map(|cached| (&*cached.film, cached.worth));
-    write_picture(
-        path,
-        &options,
-        Films { film: record.film, cached, denoised: None },
-        record.metadata(),
-    )
+    let films = Films { film: record.film, cached, denoised: None };
+    write_picture(path, &options, films, record.metadata())
 }
 
 /// Changes to materials, as `--material` reads them.
 fn edits(picture: &Picture) -> Vec<String> {
     let LoadedScene { edits, materials, .. } = &picture.scene;
-    let named = edits
-        .iter()
-        .filter_map(|(number, edit)| Some(edit.to_text(&materials.get(*number as usize)?.name)));
-    named.collect()
+    let name = |number: &u32| Some(&materials.get(*number as usize)?.name);
+    edits.iter().filter_map(|(number, edit)| Some(edit.to_text(name(number)?))).collect()
 }
 
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
@@ -134,14 +129,4 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("materials", json!(edits(picture))),
     ]);
     settings
-}
-
-/// What is remarkable about a picture that was written, for the message.
-fn remarks(picture: &Picture) -> Notices {
-    let mut notices = Notices::default();
-    let snapshot = &picture.snapshot;
-    for sentence in crate::output::remarks(&snapshot.main.film, &snapshot.request.environment) {
-        notices.add(sentence);
-    }
-    notices
 }

@@ -312,7 +312,7 @@ fn it_is_said_once_that_no_light_gets_in() {
         (document.intensity, document.stop.samples) = (intensity, Some(4));
         studio.settle().expect("rendered");
         studio.frame().expect("drawn");
-        let list = studio.app.messages.list();
+        let list = &studio.app.messages.list;
         list.iter().filter(|message| message.sentence.starts_with("No light")).count()
     };
     assert_eq!([1.0, 0.0, 1.0, 0.0].map(|intensity| said(&mut studio, intensity)), [0, 1, 1, 1]);
@@ -323,7 +323,12 @@ fn the_sun_is_put_where_it_is_asked_for_and_marked_there() {
     let Some(mut studio) = studio("living-room") else { return };
     let sunlit = |studio: &mut Studio| -> f32 {
         studio.settle().expect("rendered");
-        let legend = studio.app.display.shown.as_ref().and_then(|shown| shown.legend.clone());
+        let legend = studio
+            .app
+            .display
+            .shown
+            .as_ref()
+            .and_then(|shown| Some(shown.painted.as_ref()?.legend.clone()));
         let Some(Legend::Names(names)) = legend else { panic!("no names: {legend:?}") };
         let percent = names[0].1.strip_prefix("sunlit, ").and_then(|it| it.split_once(' '));
         percent.expect("a share").0.parse().expect("a number")
@@ -334,13 +339,13 @@ fn the_sun_is_put_where_it_is_asked_for_and_marked_there() {
     let place = Vec2::new(0.9, 0.9);
     studio.asks(Command::PutSun { place, is_last: true });
     assert!(sunlit(&mut studio) > 1.0);
-    assert!(studio.app.messages.list().is_empty(), "{:?}", studio.app.messages.list());
+    assert!(studio.app.messages.list.is_empty(), "{:?}", studio.app.messages.list);
     // The sun cannot reach the ceiling; the notice comes when the pointer is let go.
     let place = Vec2::new(0.5, 0.02);
     studio.asks(Command::PutSun { place, is_last: false });
-    assert!(studio.app.messages.list().is_empty());
+    assert!(studio.app.messages.list.is_empty());
     studio.asks(Command::PutSun { place, is_last: true });
-    let said: Vec<_> = studio.app.messages.list().iter().map(|it| &*it.sentence).collect();
+    let said: Vec<_> = studio.app.messages.list.iter().map(|it| &*it.sentence).collect();
     assert!(said.len() == 1 && said[0].contains("cannot reach this place"), "{said:?}");
 }
 

@@ -1,7 +1,7 @@
 //! `lightgrid report`.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use super::interrupt::kept;
 use super::progress::Progress;
@@ -247,17 +247,15 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
     let cancel = kept("stopping; what is measured is kept");
     tell(estimate(plan));
     let progress = Progress::start("starting");
-    let made = make(
-        plan,
-        &Options {
-            folder: &folder,
-            references: arguments.references.as_deref(),
-            adapter: arguments.adapter.as_deref(),
-            cancel: &cancel.asked,
-            progress: &|what| progress.say(what),
-            tell: &|what| progress.tell(&what),
-        },
-    );
+    let options = Options {
+        folder: &folder,
+        references: arguments.references.as_deref(),
+        adapter: arguments.adapter.as_deref(),
+        cancel: &cancel.asked,
+        progress: &|what| progress.say(what),
+        tell: &|what| progress.tell(&what),
+    };
+    let made = make(plan, &options);
     progress.finish();
     finish(&made?, &folder)
 }
@@ -302,7 +300,7 @@ fn tables(arguments: &SatArguments) -> Result<()> {
         arguments.output.as_deref(),
         |case| {
             progress.say(format!("{}, {}x{}", case.title, case.size.0, case.size.1));
-            is_set(&cancel.asked)
+            cancel.asked.load(Ordering::Relaxed)
         },
         |measured| progress.tell(&format!("{}: {}", measured.title, measured.report)),
     );
@@ -313,10 +311,6 @@ fn tables(arguments: &SatArguments) -> Result<()> {
         return Err(Error::new("stopped before the end"));
     }
     Ok(())
-}
-
-fn is_set(flag: &AtomicBool) -> bool {
-    flag.load(Ordering::Relaxed)
 }
 
 /// What was typed, to be typed again.

@@ -104,31 +104,27 @@ impl Denoiser {
         quality: Quality,
         cancel: &AtomicBool,
     ) -> Result<Option<Image>> {
+        let filter = |samples: &Samples<'_>| -> Result<Option<Image>> {
+            let image = match self.found() {
+                Self::ATrous if !samples.film.has_layers() => {
+                    return Ok(Some(samples.film.image()));
+                }
+                Self::ATrous => a_trous::denoise(samples, cancel),
+                _ => oidn::denoise(samples, quality, cancel)?,
+            };
+            Ok(image.map(|image| samples.restored(image)))
+        };
         let films = [Some(film), other.map(|(other, _)| other)].into_iter().flatten();
         let every = films.filter_map(Film::whole_pixels).min().unwrap_or(BEGINNINGS[0]);
         if every == 1 {
-            return self.filter(&Samples::of(film, other), quality, cancel);
+            return filter(&Samples::of(film, other));
         }
         let larger = film.in_larger_pixels(every);
         let other = other.map(|(other, worth)| (other.in_larger_pixels(every), worth));
         let other = other.as_ref().map(|(other, worth)| (other, *worth));
         let larger = larger.without_gaps();
-        let image = self.filter(&Samples::of(&larger, other), quality, cancel)?;
+        let image = filter(&Samples::of(&larger, other))?;
         Ok(image.map(|image| image.enlarged(every, [film.width, film.height])))
-    }
-
-    fn filter(
-        self,
-        samples: &Samples<'_>,
-        quality: Quality,
-        cancel: &AtomicBool,
-    ) -> Result<Option<Image>> {
-        let image = match self.found() {
-            Self::ATrous if !samples.film.has_layers() => return Ok(Some(samples.film.image())),
-            Self::ATrous => a_trous::denoise(samples, cancel),
-            _ => oidn::denoise(samples, quality, cancel)?,
-        };
-        Ok(image.map(|image| samples.restored(image)))
     }
 }
 

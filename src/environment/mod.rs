@@ -48,14 +48,14 @@ pub struct Environment {
     grid: TileGrid,
     table: Arc<Table>,
     tile_energies: Vec<f64>,
-    patches: PatchRows,
+    pub(crate) patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
-    importance_scale: f32,
+    pub(crate) importance_scale: f32,
     /// The pixels' importance, scaled by `importance_scale`. Placing a sample needs only these, a third of the
     /// pixels' size; most samples are occluded and need no radiance.
     importances: Arc<Vec<f32>>,
     /// One over each tile's energy in the same scale; 0 where f32 overflows.
-    inverse_energies: Vec<f32>,
+    pub(crate) inverse_energies: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
     map_mean: Vec3,
     map_is_black: bool,
@@ -264,12 +264,12 @@ impl Environment {
 
     /// Columns and rows of patches.
     pub fn patch_grid(&self) -> (u32, u32) {
-        (self.map.width, self.patches.rows().len() as u32)
+        (self.map.width, self.patches.rows.len() as u32)
     }
 
     /// Steradians of a patch of a row.
     pub fn patch_solid_angle(&self, row: u32) -> f32 {
-        self.patches.rows()[row as usize].solid_angle
+        self.patches.rows[row as usize].solid_angle
     }
 
     /// Unit world direction of a place in the patch of this column and row, `within` in `[0,1]`^2 of
@@ -336,16 +336,6 @@ impl Environment {
         (self.rotation_turns, self.intensity)
     }
 
-    /// Rows of patches.
-    pub(crate) fn patches(&self) -> &PatchRows {
-        &self.patches
-    }
-
-    /// Factor on importance, and one over each tile's energy so scaled.
-    pub(crate) fn importance_scale(&self) -> (f32, &[f32]) {
-        (self.importance_scale, &self.inverse_energies)
-    }
-
     /// Memory of the pixels and of the table.
     pub fn memory_bytes(&self) -> EnvironmentMemory {
         let rows = self.patches.memory_bytes()
@@ -380,7 +370,7 @@ impl Environment {
 
     /// Scaled energy of a patch of row `y` with corners of these importances.
     fn patch_energy(&self, corners: Corners<f32>, y: u32) -> f32 {
-        0.25 * corners.iter().sum::<f32>() * self.patches.rows()[y as usize].solid_angle
+        0.25 * corners.iter().sum::<f32>() * self.patches.rows[y as usize].solid_angle
     }
 
     /// Whether both are one map with one table, turned or scaled differently.
@@ -397,7 +387,7 @@ impl Environment {
         let x = u * width as f32 + patches::SHIFT;
         // Never negative; `floor` is a call where a machine need not have the instruction.
         let left = x as u32;
-        let rows = self.patches.rows().len() as u32;
+        let rows = self.patches.rows.len() as u32;
         let row = ((uv.y * self.map.height as f32 + patches::SHIFT) as u32).min(rows - 1);
         let squared_sine = direction.x * direction.x + direction.z * direction.z;
         MapPoint {

@@ -29,7 +29,8 @@ pub(crate) struct PatchRow {
 /// The patches of a map.
 #[derive(Debug, Clone)]
 pub(crate) struct PatchRows {
-    rows: Vec<PatchRow>,
+    /// From the top.
+    pub(crate) rows: Vec<PatchRow>,
 }
 
 impl PatchRows {
@@ -47,11 +48,6 @@ impl PatchRows {
             }
         });
         Self { rows: rows.collect() }
-    }
-
-    /// All rows from top to bottom.
-    pub(crate) fn rows(&self) -> &[PatchRow] {
-        &self.rows
     }
 
     /// Sine and cosine of the polar angle at a place of a row, `down` in `[0,1]` of its extent.
@@ -140,7 +136,7 @@ mod tests {
     fn rows_cover_the_sphere_and_find_their_own_places() {
         for (width, height) in [(1, 1), (2, 1), (4, 3), (64, 32), (16, 8192)] {
             let patches = PatchRows::new(width, height);
-            let count = patches.rows().len() as u32;
+            let count = patches.rows.len() as u32;
             let sphere: f64 =
                 (0..count).map(|row| f64::from(width) * solid_angle(width, height, row)).sum();
             assert!((sphere / (2.0 * TAU) - 1.0).abs() < 1e-12);
@@ -150,7 +146,7 @@ mod tests {
                     assert!((sine.hypot(cosine) - 1.0).abs() < 1e-6);
                     let found = patches.down(row, sine * sine, cosine);
                     // In units of f32 at the distance from the pole.
-                    let PatchRow { top, extent, .. } = patches.rows()[row as usize];
+                    let PatchRow { top, extent, .. } = patches.rows[row as usize];
                     let bound = 4.0 * f32::EPSILON * (1.0 + top / extent.abs());
                     assert!((found - down).abs() < bound, "{height} {row}: {down} {found}");
                 }

@@ -82,7 +82,12 @@ impl TileLocal {
         jobs.into_par_iter().for_each_init(
             || (Vec::new(), Vec::new()),
             |(tile_weights, scratch), (patches, row_sums, tile_sums, energy)| {
-                fill_weights(weights, &patches, tile_weights, scratch);
+                tile_weights.clear();
+                tile_weights.resize(patches.len(), 0.0);
+                let rows = tile_weights.chunks_exact_mut(patches.width() as usize);
+                for (row, y) in rows.zip(patches.y.clone()) {
+                    weights.row(patches.x.start, y, row, scratch);
+                }
                 *energy = tile_weights.iter().sum();
                 quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
@@ -274,19 +279,6 @@ impl Target {
         let mass = sums[index] - before;
         let into = (self.whole - before) as f32 + self.part as f32 * (1.0 / 4_294_967_296.0);
         Choice { index, mass, fraction: (into / mass as f32).min(1.0) }
-    }
-}
-
-fn fill_weights(
-    weights: &Weights<'_>,
-    patches: &TilePatches,
-    out: &mut Vec<f64>,
-    scratch: &mut Vec<f64>,
-) {
-    out.clear();
-    out.resize(patches.len(), 0.0);
-    for (row, y) in out.chunks_exact_mut(patches.width() as usize).zip(patches.y.clone()) {
-        weights.row(patches.x.start, y, row, scratch);
     }
 }
 

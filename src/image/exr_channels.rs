@@ -86,15 +86,16 @@ fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Candidate> {
     let mut layers: Vec<&str> = names.iter().map(|(layer, _)| layer.as_str()).collect();
     layers.dedup();
     let part_is_picture = is_picture_name(&part_name(header));
+    let candidate = |rank, layer: &str, channels| {
+        let selection = Selection { part, channels };
+        Candidate { rank, layer: layer.to_owned(), selection }
+    };
     let mut found = Vec::new();
     for layer in layers {
         let index = |wanted: &[&str]| {
             names.iter().position(|(l, name)| l == layer && wanted.contains(&name.as_str()))
         };
-        let mut push = |rank, channels| {
-            let selection = Selection { part, channels };
-            found.push(Candidate { rank, layer: layer.to_owned(), selection });
-        };
+        let mut push = |rank, channels| found.push(candidate(rank, layer, channels));
         if let (Some(r), Some(g), Some(b)) =
             (index(&["r", "red"]), index(&["g", "green"]), index(&["b", "blue"]))
         {
@@ -115,11 +116,7 @@ fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Candidate> {
     let not_alpha = names.iter().position(|(_, name)| !["a", "alpha"].contains(&name.as_str()));
     let any = Channels::Grey(not_alpha.unwrap_or(0));
     let rank = if not_alpha.is_some() { 6 } else { 7 };
-    found.push(Candidate {
-        rank,
-        layer: String::new(),
-        selection: Selection { part, channels: any },
-    });
+    found.push(candidate(rank, "", any));
     found
 }
 

@@ -78,14 +78,10 @@ impl LightGrid {
             return self.distributions.sample(distribution, bits, finer);
         }
         let (by_whole_map, bits) = split(bits, finer, whole_map_share);
-        let choice = self.distributions.sample(
-            if by_whole_map { WHOLE_MAP } else { distribution },
-            bits,
-            finer,
-        );
-        let other = self
-            .distributions
-            .probability(if by_whole_map { distribution } else { WHOLE_MAP }, choice.tile);
+        let [own, other] =
+            if by_whole_map { [WHOLE_MAP, distribution] } else { [distribution, WHOLE_MAP] };
+        let choice = self.distributions.sample(own, bits, finer);
+        let other = self.distributions.probability(other, choice.tile);
         let probability = if by_whole_map {
             mixed(choice.probability, other, whole_map_share)
         } else {

@@ -22,43 +22,20 @@ pub struct TileChoice {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileDistributions {
     tile_count: u32,
-    words_per_distribution: u32,
-    /// First entry of each distribution, and one more.
-    starts: Vec<u32>,
-    /// Bit masks of the tiles that each distribution can choose, `words_per_distribution` words each.
-    masks: Vec<u64>,
-    /// Entries before each word of the mask.
-    ranks: Vec<u16>,
-    /// Tile of each entry, ascending within a distribution.
-    tiles: Vec<u16>,
-    /// Largest 32-bit number that chooses this entry; ends with `u32::MAX` in every distribution.
-    last: Vec<u32>,
-}
-
-/// The arrays of [`TileDistributions`], for a GPU.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct DistributionArrays<'a> {
     pub(crate) words_per_distribution: u32,
-    pub(crate) starts: &'a [u32],
-    pub(crate) masks: &'a [u64],
-    pub(crate) ranks: &'a [u16],
-    pub(crate) tiles: &'a [u16],
-    pub(crate) last: &'a [u32],
+    /// First entry of each distribution, and one more.
+    pub(crate) starts: Vec<u32>,
+    /// Bit masks of the tiles that each distribution can choose, `words_per_distribution` words each.
+    pub(crate) masks: Vec<u64>,
+    /// Entries before each word of the mask.
+    pub(crate) ranks: Vec<u16>,
+    /// Tile of each entry, ascending within a distribution.
+    pub(crate) tiles: Vec<u16>,
+    /// Largest 32-bit number that chooses this entry; ends with `u32::MAX` in every distribution.
+    pub(crate) last: Vec<u32>,
 }
 
 impl TileDistributions {
-    /// The arrays.
-    pub(crate) fn arrays(&self) -> DistributionArrays<'_> {
-        DistributionArrays {
-            words_per_distribution: self.words_per_distribution,
-            starts: &self.starts,
-            masks: &self.masks,
-            ranks: &self.ranks,
-            tiles: &self.tiles,
-            last: &self.last,
-        }
-    }
-
     /// No distributions yet, over `tile_count` tiles (at most 65536).
     pub fn new(tile_count: u32) -> Self {
         assert!((1..=65536).contains(&tile_count), "tile indices are 16 bits wide");

@@ -2,7 +2,6 @@
 
 use glam::Vec2;
 
-use super::tile_distributions::TileDistributions;
 use super::{LightGrid, WHOLE_MAP};
 use crate::environment::Environment;
 
@@ -24,13 +23,18 @@ impl LightGrid {
             vec![WHOLE_MAP as u16; self.distributions.len() as usize];
         let mut weights = vec![0.0; new.tile_count() as usize];
         for distribution in 1..self.distributions.len() {
-            transfer_distribution(
-                &self.distributions,
-                distribution,
-                (old, new),
-                &sources,
-                &mut weights,
-            );
+            let visibility = |tile: u32| {
+                let energy = old.tile_energies()[tile as usize];
+                if energy > 0.0 {
+                    f64::from(self.distributions.probability(distribution, tile)) / energy
+                } else {
+                    0.0
+                }
+            };
+            let tiles = weights.iter_mut().zip(&sources).zip(new.tile_energies());
+            for ((weight, sources), energy) in tiles {
+                *weight = energy * sources.iter().map(|tile| visibility(*tile)).sum::<f64>();
+            }
             if let Some(index) = result.distributions.push(&weights) {
                 distribution_of_distribution[distribution as usize] = index as u16;
             }
@@ -44,26 +48,6 @@ impl LightGrid {
         result.whole_map_share = self.whole_map_share;
         result.generation = self.generation;
         Some(result)
-    }
-}
-
-fn transfer_distribution(
-    distributions: &TileDistributions,
-    distribution: u32,
-    (old, new): (&Environment, &Environment),
-    sources: &[[u32; PLACES.len()]],
-    weights: &mut [f64],
-) {
-    let visibility = |tile: u32| {
-        let energy = old.tile_energies()[tile as usize];
-        if energy > 0.0 {
-            f64::from(distributions.probability(distribution, tile)) / energy
-        } else {
-            0.0
-        }
-    };
-    for ((weight, sources), energy) in weights.iter_mut().zip(sources).zip(new.tile_energies()) {
-        *weight = energy * sources.iter().map(|tile| visibility(*tile)).sum::<f64>();
     }
 }
 

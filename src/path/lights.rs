@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 
 use super::World;
-use super::light_tree::{Light, LightTree, Moments, Receiver, TreeArrays};
+use super::light_tree::{Light, LightTree, Moments, Receiver};
 use crate::bsdf;
 use crate::bvh::Hit;
 use crate::color::importance;
@@ -36,16 +36,12 @@ pub struct LightSample {
 #[derive(Debug, Clone, Default)]
 pub struct LocalLights {
     /// Emissive triangles, ascending: the first lights. Punctual ones follow in the scene's order.
-    triangles: Vec<u32>,
-    tree: LightTree,
+    pub(crate) triangles: Vec<u32>,
+    /// How lights are chosen.
+    pub(crate) tree: LightTree,
 }
 
 impl LocalLights {
-    /// Emissive triangles, and how lights are chosen.
-    pub(crate) fn arrays(&self) -> (&[u32], TreeArrays<'_>) {
-        (&self.triangles, self.tree.arrays())
-    }
-
     /// Collects the lights of a scene with bounds `(min, max)`.
     pub fn new(scene: &Scene, bounds: (Vec3, Vec3)) -> Self {
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();

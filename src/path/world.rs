@@ -94,7 +94,7 @@ impl World {
 
     /// About the largest radiance of the map and of lamps; 0 without any.
     pub(crate) fn brightest(&self, environment: &Environment) -> f32 {
-        let map = environment.rotation_and_intensity().1 / environment.importance_scale().0;
+        let map = environment.rotation_and_intensity().1 / environment.importance_scale;
         let map = if environment.is_black() { 0.0 } else { map };
         let emissive = self.scene.materials.iter().map(|material| material.emissive.max_element());
         let lights = self.scene.lights.iter().map(|light| light.intensity.max_element());

@@ -39,8 +39,9 @@ const MIN_ALBEDO: f64 = 1.0 / 256.0;
 pub struct RadianceCache {
     cells: CacheCells,
     /// For each slot the check word of its cell (0 if empty) and the bits of its radiance over albedo, linear RGB.
-    slots: Vec<[u32; 4]>,
-    mean: Vec3,
+    pub(crate) slots: Vec<[u32; 4]>,
+    /// Mean radiance over albedo, which unknown cells have.
+    pub(crate) mean: Vec3,
 }
 
 impl RadianceCache {
@@ -55,11 +56,6 @@ impl RadianceCache {
         let cell = self.cells.cell_at(position, normal);
         let known = |key| self.find(key);
         known(cell.key()).or_else(|| known(cell.parent().key())).unwrap_or(self.mean)
-    }
-
-    /// The table in the GPU's layout, and the mean radiance over albedo, which unknown cells have.
-    pub(crate) fn slots_and_mean(&self) -> (&[[u32; 4]], Vec3) {
-        (&self.slots, self.mean)
     }
 
     fn find(&self, key: Key) -> Option<Vec3> {

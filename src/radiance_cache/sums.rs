@@ -29,7 +29,8 @@ pub(crate) const MAX_PATHS: u64 = 1 << 22;
 
 /// Sums of the paths' estimates of reflected radiance, cell by cell.
 pub struct RadianceSums {
-    cells: CacheCells,
+    /// Its cells.
+    pub cells: CacheCells,
     /// Units of a radiance of 1.
     scale: f32,
     words: Box<[AtomicU32]>,
@@ -53,11 +54,6 @@ impl RadianceSums {
         let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
         let words = (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect();
         Self { cells, scale, words, used: AtomicUsize::new(0) }
-    }
-
-    /// Its cells.
-    pub fn cells(&self) -> &CacheCells {
-        &self.cells
     }
 
     /// All words and the units of a radiance of 1: the state from which a GPU continues.

@@ -46,13 +46,13 @@ pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
 /// Traces the learning paths in `paths` and counts what they see; returns the number of rays.
 pub(super) fn learn(
     tracer: &PathTracer<'_>,
-    rays: &CameraRays,
     view: &View,
     paths: Range<u64>,
     cancel: &AtomicBool,
 ) -> u64 {
+    let rays = view.rays();
     in_tasks(paths, cancel, |path| {
-        let (ray, sampler) = anywhere(rays, view, LEARNING_SEED, path);
+        let (ray, sampler) = anywhere(&rays, view, LEARNING_SEED, path);
         tracer.learn(ray, sampler)
     })
 }
@@ -61,13 +61,13 @@ pub(super) fn learn(
 /// rays.
 pub(super) fn train(
     tracer: &PathTracer<'_>,
-    rays: &CameraRays,
     view: &View,
     paths: Range<u64>,
     sums: &RadianceSums,
 ) -> u64 {
+    let rays = view.rays();
     in_tasks(paths, &AtomicBool::new(false), |path| {
-        let (ray, sampler) = anywhere(rays, view, TRAINING_SEED, path);
+        let (ray, sampler) = anywhere(&rays, view, TRAINING_SEED, path);
         tracer.train(ray, sampler, sums)
     })
 }
@@ -107,13 +107,13 @@ pub(super) fn most_paths_per_pass(view: &View) -> u64 {
 /// come in an order that leaves none far from those that are done, should the pass be cut short.
 pub(super) fn render(
     tracer: &PathTracer<'_>,
-    rays: &CameraRays,
     view: &View,
     pass: Pass,
     film: &mut Film,
     cancel: &AtomicBool,
 ) -> (u64, u64) {
     let without_counts = PathTracer { counts: None, ..*tracer };
+    let rays = view.rays();
     let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
     let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
     let Some(tile) = view.shared_tile().filter(|_| pass.coverage == Coverage::All) else {
@@ -143,7 +143,7 @@ pub(super) fn render(
 struct Task<'a> {
     /// The one that counts nothing and the one that may.
     tracers: [&'a PathTracer<'a>; 2],
-    rays: &'a CameraRays,
+    rays: CameraRays,
     view: &'a View,
     pass: Pass,
     cancel: &'a AtomicBool,
@@ -156,7 +156,7 @@ impl Task<'_> {
         let index = y * view.width + x;
         let mut sampler = self.pass.sequence.sampler(view.points, view.seed, index, sample);
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
-        let lens = lens_point(self.rays, &mut sampler);
+        let lens = lens_point(&self.rays, &mut sampler);
         let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
         let tracer = self.tracers[usize::from(self.pass.counts(index, sample))];
         (self.rays.ray(centre + offset, lens), sampler, tracer)
@@ -192,7 +192,7 @@ impl Task<'_> {
         if self.cancel.load(Ordering::Relaxed) || film.pixels().all(|(_, p)| p.samples() > sample) {
             return (0, 0);
         }
-        let corner = film.corner();
+        let corner = film.corner;
         let starts: Vec<Start<'_>> = film
             .pixels()
             .map(|(at, _)| {

@@ -394,7 +394,7 @@ impl Film {
 /// A part of the film for one thread.
 pub(super) struct FilmTile<'a> {
     /// Column and row of its first pixel, were none of it outside of the picture.
-    corner: [i64; 2],
+    pub(super) corner: [i64; 2],
     rows: Vec<(&'a mut [Pixel], &'a mut [Surface])>,
 }
 
@@ -439,11 +439,6 @@ impl Film {
 }
 
 impl FilmTile<'_> {
-    /// Column and row where it begins; it may be outside of the picture.
-    pub(super) fn corner(&self) -> [i64; 2] {
-        self.corner
-    }
-
     /// Column and row of the first pixel that is in the picture.
     fn first(&self) -> [u32; 2] {
         self.corner.map(|at| at.max(0) as u32)

@@ -7,7 +7,6 @@ use glam::Vec3;
 use super::view::{Gi, View};
 use super::view_probe::middle_distance;
 use crate::path::Lit;
-use crate::path::camera::CameraRays;
 use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
 
 /// One training path for this many paths rendered; it takes about twice as long as one of them. With half as many,
@@ -38,21 +37,18 @@ pub(crate) struct CacheTraining {
 
 impl CacheTraining {
     /// `None` if paths are followed to their end.
-    pub(super) fn new(
-        (world, environment): Lit<'_>,
-        view: &View,
-        rays: &CameraRays,
-    ) -> Option<Self> {
+    pub(super) fn new((world, environment): Lit<'_>, view: &View) -> Option<Self> {
         if view.gi == Gi::Exact || view.limits.bounces < 2 {
             return None;
         }
-        let distance = middle_distance(world, [view.width, view.height], rays)?;
+        let distance = middle_distance(world, view)?;
         let edge = EDGE * distance;
         let brightest = world.brightest_lit(environment, edge);
         if brightest <= 0.0 {
             return None;
         }
-        let cells = CacheCells { center: rays.position(), edge, least_distance: 0.5 * distance };
+        let center = view.rays().position();
+        let cells = CacheCells { center, edge, least_distance: 0.5 * distance };
         let sums = RadianceSums::new(cells, brightest);
         Some(Self { sums, first: 0, paths: 0, wanted: 0, cache: None, brightest })
     }
@@ -95,7 +91,7 @@ impl CacheTraining {
         if paths < self.end() && !self.sums.is_full() {
             return paths;
         }
-        let cells = *self.sums.cells();
+        let cells = self.sums.cells;
         let cache = self.sums.cache();
         let cells = match &cache {
             Some(_) if self.cache.is_some() => None,
@@ -114,7 +110,7 @@ impl CacheTraining {
 
     /// Whether its cells are as large as those for a camera at `position` would be, or nearly so.
     pub(crate) fn suits(&self, position: Vec3) -> bool {
-        let cells = self.sums.cells();
+        let cells = &self.sums.cells;
         position.distance(cells.center) < cells.least_distance
     }
 
@@ -125,7 +121,7 @@ impl CacheTraining {
 
     /// Tells what [`Self::facts`] are of: paths that have trained it, and edge of the smallest cells.
     pub(crate) fn state(&self) -> (u64, f32) {
-        (self.paths, self.sums.cells().edge)
+        (self.paths, self.sums.cells.edge)
     }
 
     /// What is known so far.
@@ -175,8 +171,7 @@ pub(super) mod tests {
         let rays = view.rays();
         let distributions = LightGrid::whole_map(environment.tile_energies());
         let tracer = view.tracer((&world, &environment), distributions.as_ref());
-        let training =
-            CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
+        let training = CacheTraining::new((&world, &environment), &view).expect("there is light");
         let places = (0..900).filter_map(|i| {
             let at = Vec2::new((i % 30) as f32 * 2.1, (i / 30) as f32 * 1.2);
             let ray = rays.ray(at, Vec2::ZERO);
@@ -188,7 +183,7 @@ pub(super) mod tests {
         let mut known: Vec<Vec<f32>> = Vec::new();
         let mut start = 0;
         for end in [1 << 12, 1 << 17, 1 << 20] {
-            cpu::train(&tracer, &rays, &view, start..end, training.sums());
+            cpu::train(&tracer, &view, start..end, training.sums());
             start = end;
             let cache = training.sums().cache().expect("there is room");
             let radiance = |(position, normal): &(Vec3, Vec3)| {
@@ -210,11 +205,10 @@ pub(super) mod tests {
     #[test]
     fn cells_grow_where_there_are_too_many() {
         let (world, environment, view) = office();
-        let rays = view.rays();
         let mut training =
-            CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
-        let edge = training.sums.cells().edge;
-        let cells = CacheCells { edge: edge / 64.0, ..*training.sums.cells() };
+            CacheTraining::new((&world, &environment), &view).expect("there is light");
+        let edge = training.sums.cells.edge;
+        let cells = CacheCells { edge: edge / 64.0, ..training.sums.cells };
         training.sums = RadianceSums::new(cells, 1.0);
         training.begin(&view, 0, 1);
         let mut places = 0;
@@ -223,7 +217,7 @@ pub(super) mod tests {
             for place in 4 * range.start..4 * range.end {
                 let [x, z] = [place % 256, place / 256].map(|at| at as f32 * 0.02 * edge);
                 let sums = training.sums();
-                sums.add(sums.cells().center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
+                sums.add(sums.cells.center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
                 places += 1;
             }
             training.advance(range.end);

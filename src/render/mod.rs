@@ -30,7 +30,7 @@ pub use driver::Driver;
 #[cfg(feature = "window")]
 pub(crate) use driver::next_beginning;
 pub(crate) use gi::CacheTraining;
-use pass::Pass;
+use pass::{Advance, Pass};
 pub use progress::{Figures, Phase, StopRule};
 #[cfg(feature = "window")]
 pub(crate) use session::SessionState;

@@ -5,12 +5,11 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::film::Film;
-use super::{Pass, View};
+use super::{Advance, Pass, View};
 use crate::bvh::Ray;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::camera::CameraRays;
 use crate::path::{Lit, World};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
@@ -113,24 +112,11 @@ impl KernelFacts {
 /// The film on a device.
 pub(crate) enum DeviceFilm {}
 
-/// What a call of [`Renderer::render`] has set going.
-pub(super) struct Advance {
-    pub(super) samples: u64,
-    pub(super) least: u32,
-}
-
 /// What a device holds of a picture in the making.
 pub(crate) enum Renderer {}
 
 impl Renderer {
-    pub(crate) fn new(
-        uploaded: &UploadedScene,
-        _: Lit<'_>,
-        _: &View,
-        _: &CameraRays,
-        _: Option<&Film>,
-        _: bool,
-    ) -> Result<Self> {
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View, _: bool) -> Result<Self> {
         match *uploaded {}
     }
 }

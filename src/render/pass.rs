@@ -24,6 +24,15 @@ pub(super) enum Coverage {
     Every(u32),
 }
 
+/// What a call to render has set going.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Advance {
+    /// Samples of all pixels together.
+    pub(super) samples: u64,
+    /// Fewest samples of any pixel from now on.
+    pub(super) least: u32,
+}
+
 impl Coverage {
     /// Pixels and rows from one to the next.
     pub(super) fn step(self) -> u32 {

@@ -20,8 +20,9 @@ const LOOKS_AROUND: u32 = 4;
 const SEED: u32 = 0x6c6f_6f6b;
 
 /// Metres to what the camera sees, the median over its picture; `None` if it sees no surface.
-pub(super) fn middle_distance(world: &World, size: [u32; 2], rays: &CameraRays) -> Option<f32> {
-    let mut distances: Vec<f32> = looks(world, size, rays).map(|(_, hit)| hit.t).collect();
+pub(super) fn middle_distance(world: &World, view: &View) -> Option<f32> {
+    let (size, rays) = ([view.width, view.height], view.rays());
+    let mut distances: Vec<f32> = looks(world, size, &rays).map(|(_, hit)| hit.t).collect();
     distances.sort_unstable_by(f32::total_cmp);
     distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
 }

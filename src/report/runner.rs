@@ -294,18 +294,11 @@ impl Runner<'_> {
             .as_ref()
             .map_or(0, |reference| reference.pictures_missing(plan.effort.reference_noise, 0.0));
         let left = (all - done) as f64 + f64::from(reference) + SHARE_RUNS;
-        self.context.say(
-            &format!(
-                "{}: {} on {}, run {} of {}",
-                state.prepared.title,
-                plan.methods[method].name,
-                self.context.devices[device].device.title(),
-                seed + 1,
-                plan.effort.seeds
-            ),
-            left * plan.effort.seconds,
-            state.rows_after,
-        );
+        let (title, method) = (&state.prepared.title, &plan.methods[method].name);
+        let device = self.context.devices[device].device.title();
+        let run = format!("run {} of {}", seed + 1, plan.effort.seeds);
+        let step = format!("{title}: {method} on {device}, {run}");
+        self.context.say(&step, left * plan.effort.seconds, state.rows_after);
     }
 }
 

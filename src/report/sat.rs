@@ -9,7 +9,7 @@ use super::machine::Machine;
 use super::store::Store;
 use crate::environment::{SatReport, TALKS_MAPS, TIMED_SAMPLES, TableKind, sat_report, sky};
 use crate::error::Result;
-use crate::image::{Image, write_beside_and_rename};
+use crate::image::Image;
 use crate::math::direction_from_uv;
 
 /// A map with the talk's published errors.
@@ -103,10 +103,7 @@ pub fn measure_all(
             store.write(&key, &all[all.len() - 1])?;
             let value = crate::output::record::to_value(&all)?;
             crate::output::record::write_json(&folder.join("sat.json"), &value)?;
-            let text = csv(&all);
-            write_beside_and_rename(&folder.join("sat.csv"), |file| {
-                std::io::Write::write_all(file, text.as_bytes())
-            })?;
+            super::pages::write_text(&folder.join("sat.csv"), &csv(&all))?;
         }
     }
     Ok(all)

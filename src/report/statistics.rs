@@ -156,13 +156,9 @@ impl SpeedUp {
         let all = |bundle: &Bundle| (0..bundle.errors.len()).collect::<Vec<_>>();
         let (ratio, error, is_bound) = ratio(baseline, method, &all(baseline), &all(method));
         let counts = [baseline.errors.len(), method.errors.len()];
-        let interval = bootstrap(counts, |runs| ratio_of(baseline, method, runs));
+        let interval = bootstrap(counts, |[a, b]| self::ratio(baseline, method, a, b).0);
         ratio.is_finite().then_some(Self { ratio, interval, error, is_bound })
     }
-}
-
-fn ratio_of(baseline: &Bundle, method: &Bundle, [a, b]: [&[usize]; 2]) -> f64 {
-    ratio(baseline, method, a, b).0
 }
 
 /// Ratio of the times, the error at which it is taken, and whether it is only a bound.

@@ -34,12 +34,7 @@ fn cube(n: u32, size: f32) -> Bvh {
     for axis in 0..3 {
         for side in [-size, size] {
             for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                let point = |i: u32, j: u32| {
-                    let mut p = Vec3::splat(side);
-                    p[(axis + 1) % 3] = at(i);
-                    p[(axis + 2) % 3] = at(j);
-                    p
-                };
+                let point = |i: u32, j: u32| on_face(axis, side, at(i), at(j));
                 let [a, b, c, d] =
                     [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
                 corners.extend([a, b, c, a, c, d]);
@@ -47,6 +42,14 @@ fn cube(n: u32, size: f32) -> Bvh {
         }
     }
     tree(&corners)
+}
+
+/// A point of the face of a cube at `side` on an axis, by its coordinates on the next two axes.
+fn on_face(axis: usize, side: f32, i: f32, j: f32) -> Vec3 {
+    let mut point = Vec3::splat(side);
+    point[(axis + 1) % 3] = i;
+    point[(axis + 2) % 3] = j;
+    point
 }
 
 fn tree(corners: &[Vec3]) -> Bvh {
@@ -172,12 +175,7 @@ fn slivers(setting: &Setting) -> Outcome {
             }
             cuts.sort_by(f32::total_cmp);
             for pair in cuts.windows(2) {
-                let point = |i: f32, j: f32| {
-                    let mut p = Vec3::splat(side);
-                    p[(axis + 1) % 3] = i;
-                    p[(axis + 2) % 3] = j;
-                    p
-                };
+                let point = |i: f32, j: f32| on_face(axis, side, i, j);
                 let [a, b] = [pair[0], pair[1]];
                 let (p, q, r, s) = (point(a, -1.0), point(b, -1.0), point(b, 1.0), point(a, 1.0));
                 corners.extend([p, q, r, p, r, s]);

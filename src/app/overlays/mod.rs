@@ -94,12 +94,12 @@ impl Sources<'_> {
         let layers = self.film.surface_layers()?;
         let srgb = |v: f32| (crate::color::srgb_from_linear(v.clamp(0.0, 1.0)) * 255.0) as u8;
         let is_hit = |normal: &[f32; 3]| *normal != [0.0; 3];
-        let of = |color: fn([f32; 3]) -> [f32; 3], values: &[[f32; 3]]| {
-            let colors = values.iter().zip(&layers.normal);
-            colors.map(|(value, normal)| is_hit(normal).then(|| color(*value).map(srgb))).collect()
-        };
         Some(match overlay {
-            Overlay::Albedo => Painted::new(of(|albedo| albedo, &layers.albedo), Legend::None),
+            Overlay::Albedo => {
+                let albedos = layers.albedo.iter().zip(&layers.normal);
+                let colors = albedos.map(|(albedo, n)| is_hit(n).then(|| albedo.map(srgb)));
+                Painted::new(colors.collect(), Legend::None)
+            }
             Overlay::Normal => {
                 let byte = |v: f32| ((v * 0.5 + 0.5) * 255.0).round() as u8;
                 let colors = layers.normal.iter().map(|n| is_hit(n).then(|| n.map(byte)));
@@ -115,17 +115,18 @@ impl Sources<'_> {
     fn cells(&self, overlay: Overlay) -> Option<Painted> {
         let surfaces = self.surfaces?;
         let grid = self.grid?;
-        let cells = grid.grid()?;
+        let all = grid.grid()?;
         let facts = self.facts?;
-        let cell_of = |spot: &Option<Spot>| spot.map(|s| cells.cell_of(s.position, s.normal));
+        let cell_of = |spot: &Option<Spot>| spot.map(|s| all.cell_of(s.position, s.normal));
+        let cells: Vec<Option<u32>> = surfaces.spots.iter().map(cell_of).collect();
         let by_cell = |value: &dyn Fn(u32) -> Option<f32>, range: Range, unit| {
-            scaled(surfaces.spots.iter().map(|s| cell_of(s).and_then(value)), range, unit)
+            scaled(cells.iter().map(|cell| cell.and_then(value)), range, unit)
         };
         let distribution = |cell: u32| grid.distribution_of_cell(cell) as usize;
         Some(match overlay {
-            Overlay::Cells => with_borders(surfaces, cells),
-            Overlay::Faces => faces(surfaces, cells),
-            Overlay::Learned => learned(surfaces, cells, grid),
+            Overlay::Cells => with_borders(&cells, surfaces.width, all),
+            Overlay::Faces => faces(&cells, all),
+            Overlay::Learned => learned(&cells, grid),
             Overlay::Visits => {
                 by_cell(&|cell| facts.visits(cell), Range::Logarithmic, "tries a cell")
             }
@@ -142,8 +143,7 @@ impl Sources<'_> {
                     let v = (f64::from(tile / columns) + 0.5) / f64::from(rows);
                     palette::of_map_place(u as f32, v as f32)
                 };
-                let colors = surfaces.spots.iter().map(|s| cell_of(s).map(color)).collect();
-                Painted::new(colors, Legend::Map)
+                Painted::new(cells.iter().map(|cell| cell.map(color)).collect(), Legend::Map)
             }
             Overlay::Entropy => {
                 let most = (self.environment.tile_count() as f32).log2();
@@ -190,13 +190,9 @@ fn relative_error(pixel: &Pixel) -> Option<f32> {
     (error.is_finite() && error > 0.0).then_some(error as f32)
 }
 
-fn with_borders(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
-    let width = surfaces.width as usize;
-    let cells: Vec<Option<u32>> = surfaces
-        .spots
-        .iter()
-        .map(|spot| spot.map(|s| grid.cell_of(s.position, s.normal)))
-        .collect();
+fn with_borders(cells: &[Option<u32>], width: u32, grid: &SphericalGrid) -> Painted {
+    let labels = labels::of_cells(cells, width);
+    let width = width as usize;
     let colors = cells.iter().enumerate().map(|(i, cell)| {
         let left = if i % width > 0 { cells[i - 1] } else { *cell };
         let above = if i >= width { cells[i - width] } else { *cell };
@@ -210,7 +206,6 @@ fn with_borders(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
         [245, 245, 250],
         format!("{shown} of {} cells are in view", grid.cell_count()),
     )]);
-    let labels = labels::of_cells(&cells, surfaces.width);
     Painted { colors: colors.collect(), legend, labels }
 }
 
@@ -222,29 +217,20 @@ fn axes_legend() -> Legend {
     Legend::Names(names.map(|(color, name)| (color, name.to_owned())).to_vec())
 }
 
-fn faces(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
-    let face_of = |spot: &Spot| {
-        let cell = grid.cell_of(spot.position, spot.normal);
-        FACE_COLORS[grid.coordinates(cell).0 as usize % 6]
-    };
-    let colors = surfaces.spots.iter().map(|s| s.as_ref().map(face_of)).collect();
+fn faces(cells: &[Option<u32>], grid: &SphericalGrid) -> Painted {
+    let color = |cell| FACE_COLORS[grid.coordinates(cell).0 as usize % 6];
+    let colors = cells.iter().map(|cell| cell.map(color)).collect();
     let names = ["+X", "-X", "+Y (up)", "-Y (down)", "+Z", "-Z"];
     let count = grid.face_count() as usize;
     let legend = FACE_COLORS.into_iter().zip(names).take(count);
     Painted::new(colors, Legend::Names(legend.map(|(c, n)| (c, n.to_owned())).collect()))
 }
 
-fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, distributions: &LightGrid) -> Painted {
+fn learned(cells: &[Option<u32>], grid: &LightGrid) -> Painted {
     const OWN: [u8; 3] = [84, 190, 140];
     const NONE: [u8; 3] = [226, 120, 70];
-    let is_learned = |spot: &Spot| {
-        distributions.distribution_of_cell(grid.cell_of(spot.position, spot.normal)) != WHOLE_MAP
-    };
-    let colors: Vec<Option<[u8; 3]>> = surfaces
-        .spots
-        .iter()
-        .map(|s| s.as_ref().map(|spot| if is_learned(spot) { OWN } else { NONE }))
-        .collect();
+    let color = |cell| if grid.distribution_of_cell(cell) == WHOLE_MAP { NONE } else { OWN };
+    let colors: Vec<Option<[u8; 3]>> = cells.iter().map(|cell| cell.map(color)).collect();
     let pixels = colors.iter().flatten().count().max(1);
     let own = colors.iter().flatten().filter(|c| **c == OWN).count();
     let percent = 100.0 * own as f32 / pixels as f32;

@@ -29,17 +29,21 @@ pub fn hsv(hue_turns: f32, saturation: f32, value: f32) -> [u8; 3] {
 
 /// A colour that differs from those of neighbouring numbers.
 pub fn of_number(number: u32) -> [u8; 3] {
-    let hash = crate::sampler::hash(number.wrapping_add(0x51ed));
-    let unit = |shift: u32| (hash >> shift & 0xff) as f32 / 255.0;
-    hsv(unit(0), 0.35 + 0.3 * unit(8), 0.65 + 0.3 * unit(16))
+    let [hue, saturation, value, _] = units_of(number);
+    hsv(hue, 0.35 + 0.3 * saturation, 0.65 + 0.3 * value)
 }
 
 /// The colour of a number of a group: its hue is near the group's.
 pub fn of_number_in_group(number: u32, group: u32) -> [u8; 3] {
+    let [hue, saturation, value, _] = units_of(number);
+    let hue = hue_of_group(group) + 0.12 * (hue - 0.5);
+    hsv(hue, 0.3 + 0.5 * saturation, 0.45 + 0.55 * value)
+}
+
+/// Random numbers from 0 to 1 that belong to a number.
+fn units_of(number: u32) -> [f32; 4] {
     let hash = crate::sampler::hash(number.wrapping_add(0x51ed));
-    let unit = |shift: u32| (hash >> shift & 0xff) as f32 / 255.0;
-    let hue = hue_of_group(group) + 0.12 * (unit(0) - 0.5);
-    hsv(hue, 0.3 + 0.5 * unit(8), 0.45 + 0.55 * unit(16))
+    hash.to_le_bytes().map(|byte| f32::from(byte) / 255.0)
 }
 
 /// The colour that stands for a group.

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use egui::{Id, Image, RichText, Sense, TextureOptions, Ui, Vec2};
 
+use super::controls::Controls;
 use crate::app::commands::Command;
 use crate::app::history::History;
-use crate::app::interface::Chosen;
 use crate::app::kept_picture::KeptPicture;
 use crate::app::theme;
 
@@ -14,12 +14,8 @@ use crate::app::theme;
 const HEIGHT: f32 = 48.0;
 
 /// Draws the list: two can be chosen to be compared, or one and what is rendered.
-pub(in crate::app) fn show(
-    ui: &mut Ui,
-    history: &mut History,
-    chosen: &mut Chosen,
-    commands: &mut Vec<Command>,
-) {
+pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &mut History) {
+    let (chosen, commands) = (&mut controls.interface.compared, &mut *controls.commands);
     if chosen.left.is_some() {
         ui.horizontal(|ui| {
             let mut way = |is_difference, name, hint| {

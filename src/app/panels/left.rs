@@ -9,11 +9,11 @@ use egui::{
 use glam::Vec3;
 
 use super::button::button;
+use super::controls::Controls;
 use super::{map_view, material};
 use crate::app::commands::Command;
-use crate::app::document::{Document, Viewpoint};
+use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
-use crate::app::interface::Interface;
 use crate::app::loader::{LoadedMap, LoadedScene};
 use crate::app::settings_file::{Settings, lasting_map};
 use crate::app::small_maps::SmallMaps;
@@ -37,13 +37,7 @@ pub(in crate::app) struct Sources<'a> {
 }
 
 /// Draws the panel.
-pub(in crate::app) fn show(
-    ui: &mut Ui,
-    document: &mut Document,
-    interface: &mut Interface,
-    sources: Sources<'_>,
-    commands: &mut Vec<Command>,
-) {
+pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     let is_narrow = theme::is_narrow(ui);
     let width = if is_narrow { 258.0 } else { 286.0 };
@@ -51,35 +45,28 @@ pub(in crate::app) fn show(
         if is_narrow {
             ui.spacing_mut().slider_width = 66.0;
         }
-        ScrollArea::vertical()
-            .auto_shrink(false)
-            .show(ui, |ui| sections(ui, document, interface, sources, commands));
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| sections(ui, controls, sources));
     });
 }
 
 /// Draws what is in the panel.
-pub(in crate::app) fn sections(
-    ui: &mut Ui,
-    document: &mut Document,
-    interface: &mut Interface,
-    sources: Sources<'_>,
-    commands: &mut Vec<Command>,
-) {
+pub(in crate::app) fn sections(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     theme::heading(ui, "SCENE");
-    scene(ui, document, sources, commands);
+    scene(ui, controls, sources);
     theme::heading(ui, "CAMERA");
-    cameras(ui, document, sources.scene, commands);
+    cameras(ui, controls, sources.scene);
     theme::section(ui, "ENVIRONMENT");
-    environment(ui, document, interface, sources, commands);
+    environment(ui, controls, sources);
     if let Some(scene) = sources.scene {
         theme::section(ui, "FOG");
-        fog(ui, &mut document.fog, &scene.world.scene);
+        fog(ui, &mut controls.document.fog, &scene.world.scene);
         theme::section(ui, "MATERIAL");
-        material::show(ui, document, interface, scene);
+        material::show(ui, controls, scene);
     }
 }
 
-fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut Vec<Command>) {
+fn scene(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
+    let Controls { document, commands, .. } = controls;
     let mut chosen = None;
     theme::choice(ui, "scene").selected_text(theme::file_name(&document.scene)).show_ui(ui, |ui| {
         ui.label(theme::quiet("Built in"));
@@ -143,12 +130,8 @@ fn named(ui: &mut Ui, is_current: bool, small: Option<&TextureHandle>, name: &st
     ui.add(row)
 }
 
-fn cameras(
-    ui: &mut Ui,
-    document: &mut Document,
-    scene: Option<&LoadedScene>,
-    commands: &mut Vec<Command>,
-) {
+fn cameras(ui: &mut Ui, controls: &mut Controls<'_>, scene: Option<&LoadedScene>) {
+    let Controls { document, commands, .. } = controls;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::Vec2::splat(4.0);
         for (i, camera) in scene.iter().flat_map(|s| s.world.scene.cameras.iter()).enumerate() {
@@ -197,13 +180,8 @@ fn cameras(
     }
 }
 
-fn environment(
-    ui: &mut Ui,
-    document: &mut Document,
-    interface: &mut Interface,
-    sources: Sources<'_>,
-    commands: &mut Vec<Command>,
-) {
+fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
+    let Controls { document, interface, commands } = controls;
     if let Some(map) = sources.map {
         let turn = document.rotation_degrees / 360.0;
         let response = map_view::preview(ui, map, turn);

@@ -3,19 +3,15 @@
 use egui::{Align, RichText, Ui};
 use glam::Vec3;
 
-use crate::app::document::{Document, called};
-use crate::app::interface::Interface;
+use super::controls::Controls;
+use crate::app::document::called;
 use crate::app::loader::LoadedScene;
 use crate::app::theme;
 use crate::scene::{Material, MaterialEdit, TextureSlot};
 
 /// Draws the section.
-pub(super) fn show(
-    ui: &mut Ui,
-    document: &mut Document,
-    interface: &mut Interface,
-    scene: &LoadedScene,
-) {
+pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
+    let Controls { document, interface, .. } = controls;
     let title = |number: u32| {
         let name = called(number, &scene.materials);
         match document.materials.get(&number) {

@@ -18,17 +18,17 @@ const MARGIN: f32 = 12.0;
 /// for all, the newest are in sight.
 pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Messages) {
     let now = context.time();
-    messages.list().retain(|message| {
+    messages.list.retain(|message| {
         message.is_error || message.since.is_none_or(|since| now - since < NOTICE_SECONDS)
     });
-    if messages.list().is_empty() {
+    if messages.list.is_empty() {
         return;
     }
     // Errors go when they are closed.
-    if messages.list().iter().any(|message| !message.is_error) {
+    if messages.list.iter().any(|message| !message.is_error) {
         context.request_repaint_after(std::time::Duration::from_secs(1));
     }
-    if messages.list().iter().any(|message| message.since.is_none()) {
+    if messages.list.iter().any(|message| message.since.is_none()) {
         // How high they are is known once they are laid out: until then they would lie too low.
         context.request_discard("a message is new");
     }
@@ -45,7 +45,7 @@ pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Message
 
 fn list(ui: &mut Ui, width: f32, now: f64, messages: &mut Messages) {
     let mut closed = None;
-    for (i, message) in messages.list().iter_mut().enumerate() {
+    for (i, message) in messages.list.iter_mut().enumerate() {
         message.since.get_or_insert(now);
         let color = if message.is_error { theme::ALERT } else { theme::TEXT };
         let edge = if message.is_error { theme::ALERT } else { Color32::from_rgb(70, 74, 82) };
@@ -69,6 +69,6 @@ fn list(ui: &mut Ui, width: f32, now: f64, messages: &mut Messages) {
             });
     }
     if let Some(index) = closed {
-        messages.list().remove(index);
+        messages.list.remove(index);
     }
 }

@@ -2,10 +2,10 @@
 
 use egui::{ComboBox, RichText, Ui};
 
+use super::controls::Controls;
 use crate::app::commands::Command;
 use crate::app::convergence::name_of;
 use crate::app::desktop::METHOD;
-use crate::app::document::Light;
 use crate::app::theme;
 use crate::render::Sampling;
 
@@ -25,7 +25,8 @@ const TITLE: &str =
     "Atanasov et al., Adaptive Environment Sampling on CPU and GPU, ACM SIGGRAPH 2018 Talks";
 
 /// Draws the choice.
-pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light, commands: &mut Vec<Command>) {
+pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>) {
+    let light = &mut controls.document.light;
     theme::row(ui, "Sampling", "How the map is sampled; only noise and speed differ", |ui| {
         ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
             ui,
@@ -42,7 +43,7 @@ pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light, commands: &mut Vec<Co
     );
     let link = ui.link(RichText::new("About the method").size(12.0));
     if link.on_hover_text(format!("{TITLE}\n{METHOD}")).clicked() {
-        commands.push(Command::ShowMethod);
+        controls.commands.push(Command::ShowMethod);
     }
 }
 

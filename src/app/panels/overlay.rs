@@ -29,7 +29,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
     }
     let shown = shown.filter(|s| s.order.overlay == Some(overlay));
     let cache = shown.filter(|_| overlay.is_of_cache()).map(|s| &s.order.snapshot.cache);
-    match shown.and_then(|s| s.legend.as_ref()) {
+    match shown.and_then(|s| Some(&s.painted.as_ref()?.legend)) {
         Some(shown) => legend(ui, shown),
         None if let Some(Err(missing)) = cache => {
             ui.label(theme::quiet(no_cache(*missing)));

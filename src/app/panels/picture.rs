@@ -3,6 +3,7 @@
 use egui::{DragValue, Ui};
 
 use super::button::button;
+use super::controls::Controls;
 use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::theme;
@@ -12,10 +13,10 @@ use crate::tone::{DAYLIGHT_KELVIN, KELVIN, TINT, ToneCurve, WhiteBalance};
 /// Draws the settings, given the automatic exposure in stops and what maximum of bounces takes of the picture.
 pub(in crate::app) fn show(
     ui: &mut Ui,
-    document: &mut Document,
+    controls: &mut Controls<'_>,
     (exposure_ev, cut_off): (Option<f32>, Option<&str>),
-    commands: &mut Vec<Command>,
 ) {
+    let Controls { document, commands, .. } = controls;
     theme::heading(ui, "DEVELOP");
     exposure(ui, document, exposure_ev);
     curve(ui, document);

@@ -2,17 +2,19 @@
 
 use egui::{Margin, Panel, ScrollArea, Ui};
 
-use crate::app::interface::{Interface, Tab};
+use super::controls::Controls;
+use crate::app::interface::Tab;
 use crate::app::theme;
 
 /// Draws the tabs and, below, what `content` draws for the chosen one; the scene has one where there is no
 /// left panel.
 pub(in crate::app) fn show(
     ui: &mut Ui,
-    interface: &mut Interface,
-    content: impl FnOnce(&mut Ui, &mut Interface),
+    controls: &mut Controls<'_>,
+    content: impl FnOnce(&mut Ui, &mut Controls<'_>),
 ) {
     let has_scene = theme::is_small(ui);
+    let interface = &mut *controls.interface;
     if !has_scene && interface.tab == Tab::Scene {
         interface.tab = Tab::Picture;
     } else if has_scene && interface.is_material_new && interface.tab == Tab::Picture {
@@ -20,14 +22,15 @@ pub(in crate::app) fn show(
     }
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     Panel::right("right").frame(frame).exact_size(300.0).show(ui, |ui| {
+        let tab = &mut controls.interface.tab;
         ui.horizontal(|ui| {
             if has_scene {
-                ui.selectable_value(&mut interface.tab, Tab::Scene, "Scene");
+                ui.selectable_value(tab, Tab::Scene, "Scene");
             }
-            ui.selectable_value(&mut interface.tab, Tab::Picture, "Picture");
-            ui.selectable_value(&mut interface.tab, Tab::Inspect, "Inspect");
+            ui.selectable_value(tab, Tab::Picture, "Picture");
+            ui.selectable_value(tab, Tab::Inspect, "Inspect");
         });
         ui.separator();
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, interface));
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, controls));
     });
 }

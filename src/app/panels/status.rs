@@ -87,21 +87,14 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     };
     match snapshot.activity {
         Activity::Moving => {
-            word(
-                ui,
-                "Moving",
-                theme::SECOND,
-                "A coarse picture while the view or light changes, over what was seen before",
-            );
+            let hint =
+                "A coarse picture while the view or light changes, over what was seen before";
+            word(ui, "Moving", theme::SECOND, hint);
         }
         Activity::Learning(share) => {
-            let learning = &snapshot.now;
-            let all = snapshot.request.view.learning_paths;
-            let text = format!(
-                "Learning {} / {} paths",
-                theme::count(learning.learning_paths),
-                theme::count(all)
-            );
+            let paths = [snapshot.now.learning_paths, snapshot.request.view.learning_paths];
+            let [traced, all] = paths.map(theme::count);
+            let text = format!("Learning {traced} / {all} paths");
             ui.add(
                 egui::ProgressBar::new(share)
                     .desired_width(190.0)
@@ -138,19 +131,11 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
             word(ui, text, *color, &format!("{hint}: {percent}"));
         }
     }
-    number(
-        ui,
-        &theme::samples(snapshot.mean_samples()),
-        "samples",
-        "Mean samples per pixel, of cached light too",
-    );
+    let hint = "Mean samples per pixel, of cached light too";
+    number(ui, &theme::samples(snapshot.mean_samples()), "samples", hint);
     if !status.hides_clock {
-        number(
-            ui,
-            &theme::clock(snapshot.seconds()),
-            "",
-            "Time spent on learning and rendering, cached light included",
-        );
+        let hint = "Time spent on learning and rendering, cached light included";
+        number(ui, &theme::clock(snapshot.seconds()), "", hint);
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
         if !theme::is_small(ui) {
             let hint = "Rays per second of rendering, shadow rays included";

@@ -274,7 +274,8 @@ fn picture(
     let painter = ui.painter();
     let has_squares = has_squares(&shown.picture, shown, scope);
     let number = shown.order.snapshot.number;
-    let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
+    let overlay = shown.painted.as_ref().map(|painted| &painted.colors);
+    let recipe = Recipe::new(&shown.picture, overlay, settings, number);
     let changes = changes(ui, &shown.picture, scope);
     let request = &shown.order.snapshot.request;
     let of = (Arc::clone(&request.world.geometry), request.view.camera.clone());
@@ -329,7 +330,7 @@ fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
 fn labels(ui: &Ui, rect: Rect, shown: &Shown) {
     let painter = ui.painter_at(rect);
     let font = FontId::proportional((rect.width() / 85.0).clamp(7.0, 12.0));
-    for label in &shown.labels {
+    for label in shown.painted.iter().flat_map(|painted| &painted.labels) {
         let at = rect.min + Vec2::new(label.place.x, label.place.y) * rect.size();
         painter.text(at, Align2::CENTER_CENTER, &label.text, font.clone(), Color32::BLACK);
     }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::carried::Carried;
-use super::order::{Order, Shown};
+use super::order::{Order, Painted, Shown};
 use super::recent::Recent;
 use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
-use crate::app::overlays::{CellFacts, Label, Legend, Overlay, Sources};
+use crate::app::overlays::{CellFacts, Overlay, Sources};
 use crate::app::worker::{Request, Snapshot};
-use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::develop::{Developer, LinearPicture};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::LightGrid;
@@ -79,14 +79,6 @@ struct Uploads {
     compared: Last<(Comparison, Option<SourceKey>), Compared>,
     metered: Last<(SourceKey, WhiteBalance), f32>,
     overlay: Last<OverlayKey, Option<Painted>>,
-}
-
-/// An overlay on the device.
-#[derive(Clone)]
-struct Painted {
-    colors: OverlayTexture,
-    legend: Legend,
-    labels: Vec<Label>,
 }
 
 impl Memory {
@@ -173,9 +165,6 @@ impl Memory {
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
         developer.gpu().check()?;
-        let (overlay, words) =
-            painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
-        let (legend, labels) = words.unzip();
         Ok(Some(Shown {
             order: order.presented(),
             picture,
@@ -185,9 +174,7 @@ impl Memory {
             difference,
             uncompared,
             automatic_ev,
-            overlay,
-            legend,
-            labels: labels.unwrap_or_default(),
+            painted,
             failure,
         }))
     }

@@ -103,6 +103,17 @@ impl Order {
     }
 }
 
+/// An overlay on the device.
+#[derive(Clone)]
+pub(in crate::app) struct Painted {
+    /// Its colours, one a pixel of the picture.
+    pub(in crate::app) colors: OverlayTexture,
+    /// What they mean.
+    pub(in crate::app) legend: Legend,
+    /// What it writes on the picture.
+    pub(in crate::app) labels: Vec<Label>,
+}
+
 /// What the screen is developed from.
 pub(crate) struct Shown {
     /// What was ordered.
@@ -117,12 +128,8 @@ pub(crate) struct Shown {
     pub(in crate::app) other: Option<LinearPicture>,
     /// Stops that bring the picture to middle grey; 0 unless measured.
     pub automatic_ev: f32,
-    /// The overlay's colours, one a pixel of `picture`.
-    pub(in crate::app) overlay: Option<OverlayTexture>,
-    /// What they mean.
-    pub legend: Option<Legend>,
-    /// What the overlay writes on the picture.
-    pub labels: Vec<Label>,
+    /// The overlay.
+    pub(in crate::app) painted: Option<Painted>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
     /// How far apart the pictures are whose difference is shown: [`crate::metrics::relative_rms_error`].

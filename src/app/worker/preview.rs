@@ -90,24 +90,6 @@ impl Preview {
         session.samples() > 0 && self.is_stale(MAIN, in_place, false)
     }
 
-    /// Whether a session's film is to be copied now.
-    fn is_copy_due(
-        &self,
-        role: usize,
-        session: &Session<'_>,
-        in_place: Option<&(Gpu, DeviceFilm)>,
-        is_final: bool,
-    ) -> bool {
-        let Some(copy) = &self.copies[role] else { return true };
-        // The last picture, and the first one with a sample in every pixel, are shown at once.
-        if is_final || session.samples() > 0 && copy.session.samples == 0 {
-            return true;
-        }
-        // Nobody looks at one whose first pixels are not everywhere.
-        let is_unseen = in_place.is_none() && !session.is_begun();
-        !is_unseen && self.is_stale(role, in_place, self.rests)
-    }
-
     /// A session's picture, and what reading a film that is shown `in_place` took of the time.
     pub(super) fn session_snapshot(
         &mut self,
@@ -117,7 +99,13 @@ impl Preview {
         is_final: bool,
     ) -> (SessionSnapshot, Duration) {
         let (is_in_place, mut cost) = (in_place.is_some(), Duration::ZERO);
-        let is_due = self.is_copy_due(role, session, in_place.as_ref(), is_final);
+        let is_due = self.copies[role].as_ref().is_none_or(|copy| {
+            // The last picture, and the first one with a sample in every pixel, are shown at once.
+            let is_awaited = is_final || session.samples() > 0 && copy.session.samples == 0;
+            // Nobody looks at one whose first pixels are not everywhere.
+            let is_unseen = !is_in_place && !session.is_begun();
+            is_awaited || !is_unseen && self.is_stale(role, in_place.as_ref(), self.rests)
+        });
         let copy = match self.copies[role].take().filter(|_| !is_due) {
             Some(copy) => copy,
             None => {
@@ -163,7 +151,7 @@ impl Preview {
         cached: Option<&CachedPicture<Session<'_>>>,
     ) -> (Option<Backdrop>, Option<BlockErrors>) {
         let cached = cached.filter(|_| request.wants_cached);
-        let cached = cached.and_then(|cached| self.cached_film(cached));
+        let cached = cached.and_then(|cached| self.cached_film(&cached.session));
         let samples = cached.as_ref().map_or(0, |(samples, _)| *samples);
         let known = self.errors.take().filter(|(of, beside, _)| {
             std::ptr::eq(of.as_ptr(), Arc::as_ptr(exact)) && *beside == samples
@@ -181,10 +169,7 @@ impl Preview {
 
     /// The cached picture's film and how many samples that has, if these are all over the picture. A copy is made unless
     /// there is a new one already or, while the window rests, any: it is megabytes.
-    fn cached_film(
-        &mut self,
-        CachedPicture { session, .. }: &CachedPicture<Session<'_>>,
-    ) -> Option<(u64, Arc<Film>)> {
+    fn cached_film(&mut self, session: &Session<'_>) -> Option<(u64, Arc<Film>)> {
         let copy = self.cached_copy.take();
         let samples = session.figures().samples;
         if !session.is_begun() {

@@ -165,7 +165,8 @@ impl RenderJob {
         driver
     }
 
-    /// Does one piece of work; whether it was the last.
+    /// Does one piece of work; whether it was the last. Before it the checkpoint is written if it is time, and the next
+    /// pass is cut short when it will be so again or the seconds are over.
     ///
     /// # Errors
     /// If a GPU fails.
@@ -178,36 +179,23 @@ impl RenderJob {
     ) -> Result<bool> {
         driver.take_up()?;
         if driver.awaited.is_none() {
-            self.look_at_clock(driver, interrupt, alarm, notices);
+            let deadline = driver.deadline();
+            if self.due(driver).is_some_and(|due| due <= Instant::now()) {
+                // A late one would be taken for a person's wish to end.
+                alarm.set(None);
+                if let Err(failure) = self.keep(driver) {
+                    say(notices, failure.to_string());
+                }
+                if deadline.is_none_or(|deadline| deadline > Instant::now()) {
+                    interrupt.go_on();
+                }
+            }
+            alarm.set(deadline.into_iter().chain(self.due(driver)).min());
         }
         if driver.has_samples() {
             interrupt.keep();
         }
         driver.step(&interrupt.asked)
-    }
-
-    /// Writes the checkpoint if it is time, and has the next pass cut short when it will be so again or
-    /// the seconds are over.
-    fn look_at_clock(
-        &mut self,
-        driver: &mut Driver<'_>,
-        interrupt: &Interrupt,
-        alarm: &Alarm,
-        notices: &mut Notices,
-    ) {
-        let deadline = driver.deadline();
-        let due = self.due(driver);
-        if due.is_some_and(|due| due <= Instant::now()) {
-            // A late one would be taken for a person's wish to end.
-            alarm.set(None);
-            if let Err(failure) = self.keep(driver) {
-                say(notices, failure.to_string());
-            }
-            if deadline.is_none_or(|deadline| deadline > Instant::now()) {
-                interrupt.go_on();
-            }
-        }
-        alarm.set(deadline.into_iter().chain(self.due(driver)).min());
     }
 
     /// When the checkpoint is to be written next. Before learning is over the samples would be worth nothing

@@ -56,14 +56,6 @@ pub(crate) struct Node {
     link: u32,
 }
 
-/// The arrays of a [`LightTree`], for a GPU.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TreeArrays<'a> {
-    pub(crate) nodes: &'a [Node],
-    pub(crate) leaves: &'a [u32],
-    pub(crate) distant: &'a [DistantLight],
-}
-
 /// A light without a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DistantLight {
@@ -84,11 +76,11 @@ pub(super) struct LightChoice {
 
 /// Chooses among lights by number.
 #[derive(Debug, Clone, Default)]
-pub(super) struct LightTree {
-    nodes: Vec<Node>,
+pub(crate) struct LightTree {
+    pub(crate) nodes: Vec<Node>,
     /// Node of each of the first lights.
-    leaves: Vec<u32>,
-    distant: Vec<DistantLight>,
+    pub(crate) leaves: Vec<u32>,
+    pub(crate) distant: Vec<DistantLight>,
 }
 
 impl LightTree {
@@ -111,11 +103,6 @@ impl LightTree {
         }
         let distant = distant_shares(distant, (!nodes.is_empty()).then_some(power));
         Self { nodes, leaves: leaf_of, distant }
-    }
-
-    /// The arrays.
-    pub(super) fn arrays(&self) -> TreeArrays<'_> {
-        TreeArrays { nodes: &self.nodes, leaves: &self.leaves, distant: &self.distant }
     }
 
     /// Whether there is no light.

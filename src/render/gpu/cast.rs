@@ -42,7 +42,7 @@ impl Caster {
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(uploaded: &UploadedScene, lit: Lit<'_>, view: &View) -> Result<Self> {
-        Dispatcher::new(uploaded, lit, view, &view.rays()).map(Self)
+        Dispatcher::new(uploaded, lit, view).map(Self)
     }
 
     /// Uploads rays to be traced; they begin where they say, whatever their `t_min`.

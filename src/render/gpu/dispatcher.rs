@@ -8,7 +8,7 @@ use super::super::View;
 use super::bound::Bound;
 use super::buffers::Buffers;
 use super::device::Gpu;
-use super::features::{self, Features, ViewFeatures};
+use super::features::{self, Features, KernelFeatures, ViewFeatures};
 use super::film;
 use super::flight::{Flights, Job};
 use super::kernel::Kernel;
@@ -22,7 +22,6 @@ use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::Lit;
-use crate::path::camera::CameraRays;
 use crate::scene::needs::SceneFeatures;
 
 /// Tiles of a dispatch that keep a software device's cores busy.
@@ -54,24 +53,30 @@ impl Dispatcher {
         uploaded: &UploadedScene,
         (world, environment): Lit<'_>,
         view: &View,
-        rays: &CameraRays,
     ) -> Result<Self> {
         features::check(view)?;
+        let gpu = uploaded.gpu.clone();
         let mut features = Features::of(world, environment, view);
-        if uploaded.gpu.has_hardware_rays() {
-            features = features.with_hardware_rays();
-        }
-        if !uploaded.gpu.facts().is_software() {
-            features = features.with_fusing();
-        }
-        let mut buffers = uploaded.buffers.for_renderer();
+        features.kernel.set(KernelFeatures::HARDWARE_RAYS, gpu.has_hardware_rays());
+        // GPUs may fuse products with sums.
+        features.kernel.set(KernelFeatures::FUSING, !gpu.facts().is_software());
         let mut globals = uploaded.globals;
-        globals.set_view(view, rays);
+        globals.set_view(view, &view.rays());
         globals.set_fog(view.fog(world).as_ref());
-        let mut constants = uploaded.constants;
-        upload_tables(&mut buffers, view, environment, features, &mut constants)?;
-        constants.shared_tile = view.shared_tile();
         globals.film_scale = film::scale_for(world.brightest(environment));
+        let mut dispatcher = Self {
+            flights: Flights::new(&gpu),
+            gpu,
+            buffers: uploaded.buffers.for_renderer(),
+            globals,
+            features,
+            constants: Constants { shared_tile: view.shared_tile(), ..uploaded.constants },
+            seed: view.seed,
+            kernels: BTreeMap::new(),
+            compile_seconds: 0.0,
+        };
+        dispatcher.put_tables(view, environment)?;
+        let buffers = &mut dispatcher.buffers;
         if features.view.contains(ViewFeatures::COUNTING) {
             // Until there is something to count.
             for name in ["visits", "slot_of_cell", "counters"] {
@@ -79,19 +84,27 @@ impl Dispatcher {
             }
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let dispatcher = Self {
-            flights: Flights::new(&uploaded.gpu),
-            gpu: uploaded.gpu.clone(),
-            buffers,
-            globals,
-            features,
-            constants,
-            seed: view.seed,
-            kernels: BTreeMap::new(),
-            compile_seconds: 0.0,
-        };
         dispatcher.write_globals();
         Ok(dispatcher)
+    }
+
+    /// Uploads the small tables of numbers; says where each begins.
+    fn put_tables(&mut self, view: &View, environment: &Environment) -> Result<()> {
+        let Self { buffers, constants, features, .. } = self;
+        let mut texels = albedo::texels();
+        constants.sheen_at = texels.len() as u32;
+        if features.scene.contains(SceneFeatures::SHEEN) {
+            texels.extend(sheen::texels());
+        }
+        constants.rescatter_at = texels.len() as u32;
+        if features.scene.contains(SceneFeatures::ROUGH_GLASS) {
+            texels.extend(rescatter::texels());
+        }
+        constants.filter_at = texels.len() as u32;
+        texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
+        constants.rows_at = texels.len() as u32;
+        texels.extend(layout::map_rows(environment));
+        put_array(buffers, "tables", "the list of constants", &texels)
     }
 
     /// The tiles of the view.
@@ -186,28 +199,4 @@ impl Dispatcher {
         let job = Job { kernel: order[0], kernels: &kernels, steps, groups, units, report };
         self.flights.start(&self.gpu, &job)
     }
-}
-
-/// Uploads the small tables of numbers; says where each begins.
-fn upload_tables(
-    buffers: &mut Buffers,
-    view: &View,
-    environment: &Environment,
-    features: Features,
-    constants: &mut Constants,
-) -> Result<()> {
-    let mut texels = albedo::texels();
-    constants.sheen_at = texels.len() as u32;
-    if features.scene.contains(SceneFeatures::SHEEN) {
-        texels.extend(sheen::texels());
-    }
-    constants.rescatter_at = texels.len() as u32;
-    if features.scene.contains(SceneFeatures::ROUGH_GLASS) {
-        texels.extend(rescatter::texels());
-    }
-    constants.filter_at = texels.len() as u32;
-    texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
-    constants.rows_at = texels.len() as u32;
-    texels.extend(layout::map_rows(environment));
-    put_array(buffers, "tables", "the list of constants", &texels)
 }

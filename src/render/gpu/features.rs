@@ -193,18 +193,6 @@ impl Features {
         Self { scene: SceneFeatures::all(), view, kernel: KernelFeatures::empty() }
     }
 
-    /// The same for a device whose own ray queries find what rays hit.
-    pub(crate) fn with_hardware_rays(mut self) -> Self {
-        self.kernel |= KernelFeatures::HARDWARE_RAYS;
-        self
-    }
-
-    /// The same for a device that may fuse products with sums, as GPUs do.
-    pub(crate) fn with_fusing(mut self) -> Self {
-        self.kernel |= KernelFeatures::FUSING;
-        self
-    }
-
     /// The same for a kernel, whose walks' stacks may not fit into workgroup memory.
     pub(super) fn in_kernel(mut self, kernel: Kernel, is_deep: bool) -> Self {
         let is_cached = self.view.contains(ViewFeatures::RADIANCE_CACHE);

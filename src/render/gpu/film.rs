@@ -69,7 +69,6 @@ impl Sums {
         [width, height]: [u32; 2],
         layers: bool,
         scale: f32,
-        film: Option<&Film>,
     ) -> Result<Self> {
         let pixels = u64::from(width) * u64::from(height);
         for name in PIXELS {
@@ -80,11 +79,7 @@ impl Sums {
                 buffers.make(name, pixels * SURFACE_BYTES, "the picture's layers")?;
             }
         }
-        let sums = Self { width, height, layers, scale, rays: AtomicU64::new(0) };
-        if let Some(film) = film {
-            sums.write(buffers, film)?;
-        }
-        Ok(sums)
+        Ok(Self { width, height, layers, scale, rays: AtomicU64::new(0) })
     }
 
     /// Where it is.

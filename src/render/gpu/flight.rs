@@ -35,7 +35,8 @@ pub(super) struct Flights {
     clock: Option<Clock>,
     /// For words of a buffer that a job reports.
     staging: Option<[Buffer; MAX_IN_FLIGHT]>,
-    report: Option<[u32; 4]>,
+    /// What the last job to land that reports has reported.
+    pub(super) report: Option<[u32; 4]>,
     started: usize,
     figures: FlightFigures,
 }
@@ -93,15 +94,6 @@ impl Flights {
     /// What the dispatches so far took.
     pub(super) fn figures(&self) -> FlightFigures {
         self.figures
-    }
-
-    /// What the last job to land that reports has reported.
-    pub(super) fn report(&self) -> Option<[u32; 4]> {
-        self.report
-    }
-
-    pub(super) fn forget_report(&mut self) {
-        self.report = None;
     }
 
     /// Submits a job, once there is room for it.

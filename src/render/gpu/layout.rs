@@ -11,9 +11,9 @@ use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
 use crate::medium::{Fog, Phase};
-use crate::path::World;
 use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
+use crate::path::{LocalLights, World};
 use crate::radiance_cache::CacheCells;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
@@ -213,7 +213,7 @@ impl Globals {
         (self.map_width, self.map_height) = (environment.map().width, environment.map().height);
         (self.tile_columns, self.tile_rows) = environment.tile_grid();
         (self.rotation_turns, self.intensity) = environment.rotation_and_intensity();
-        self.importance_scale = environment.importance_scale().0;
+        self.importance_scale = environment.importance_scale;
         self.mean_contribution = std::f32::consts::PI * importance(environment.mean_radiance());
     }
 
@@ -272,7 +272,7 @@ pub(crate) fn vertices(scene: &Scene, texels: &VertexTexels) -> Vec<[f32; 4]> {
 
 /// The distributions of a grid; sets where each array begins.
 pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32> {
-    let distributions = grid.distributions().arrays();
+    let distributions = grid.distributions();
     let mut words = Vec::new();
     let mut push = |part: &mut dyn Iterator<Item = u32>| {
         let at = words.len() as u32;
@@ -282,8 +282,8 @@ pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32>
     globals.distribution_starts_at = push(&mut distributions.starts.iter().copied());
     globals.distribution_masks_at =
         push(&mut distributions.masks.iter().flat_map(|mask| [*mask as u32, (mask >> 32) as u32]));
-    globals.distribution_ranks_at = push(&mut pairs(distributions.ranks));
-    globals.distribution_tiles_at = push(&mut pairs(distributions.tiles));
+    globals.distribution_ranks_at = push(&mut pairs(&distributions.ranks));
+    globals.distribution_tiles_at = push(&mut pairs(&distributions.tiles));
     globals.distribution_last_at = push(&mut distributions.last.iter().copied());
     globals.distribution_of_cell_at = NO_ARRAY;
     if let Some((cells, distribution_of_cell)) = grid.cells() {
@@ -424,10 +424,10 @@ pub(super) const PUNCTUAL_WORDS: usize = 16;
 
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
-    let (triangles, tree) = world.lights.arrays();
+    let LocalLights { triangles, tree } = &world.lights;
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;
-    let mut words = [triangles, tree.leaves].concat();
+    let mut words = [triangles.as_slice(), &tree.leaves].concat();
     words.extend(tree.distant.iter().flat_map(|distant| [distant.share, distant.light]));
     for light in &world.scene.lights {
         let (kind, cosines) = match light.kind {
@@ -491,8 +491,8 @@ pub(super) fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
 
 /// Rows of the map's patches, then one over each tile's energy.
 pub(crate) fn map_rows(environment: &Environment) -> impl Iterator<Item = [f32; 4]> {
-    let rows = environment.patches().rows().iter();
-    let energies = environment.importance_scale().1.iter();
+    let rows = environment.patches.rows.iter();
+    let energies = environment.inverse_energies.iter();
     rows.map(|row| [row.top, row.extent, row.solid_angle, 0.0])
         .chain(energies.map(|inverse| [*inverse, 0.0, 0.0, 0.0]))
 }

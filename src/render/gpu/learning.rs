@@ -37,7 +37,7 @@ pub(super) fn train(
     cancel: &AtomicBool,
 ) -> Result<(u64, u64)> {
     let (words, scale) = sums.words_and_scale();
-    on.globals.set_cells_of_cache(sums.cells(), scale);
+    on.globals.set_cells_of_cache(&sums.cells, scale);
     on.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
     let done = trace_anywhere(on, Kernel::Train, paths, cancel)?;
     sums.set_words(&on.read_words("cache_sums", words.len())?);
@@ -132,8 +132,7 @@ pub(super) mod tests {
         let never = AtomicBool::new(false);
         let mut renderer = gpu.map(|gpu| {
             let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true)
-                .expect("it fits")
+            Renderer::new(&uploaded, (&world, &environment), &view, true).expect("it fits")
         });
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
@@ -162,9 +161,9 @@ pub(super) mod tests {
                     let tracer = view.tracer((&world, &environment), distributions.as_ref());
                     let tracer = PathTracer { counts: Some(&learning), ..tracer };
                     match (paths, rendered) {
-                        (Some(paths), _) => cpu::learn(&tracer, &rays, &view, paths, &never),
+                        (Some(paths), _) => cpu::learn(&tracer, &view, paths, &never),
                         (None, Some(pass)) => {
-                            cpu::render(&tracer, &rays, &view, pass, &mut film, &never).1
+                            cpu::render(&tracer, &view, pass, &mut film, &never).1
                         }
                         (None, None) => 0,
                     }
@@ -207,23 +206,20 @@ pub(super) mod tests {
         let Some(gpu) = Gpu::for_test() else { return };
         let (world, environment) = crack();
         let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
         let training =
-            || CacheTraining::new((&world, &environment), &view, &rays).expect("there is light");
+            || CacheTraining::new((&world, &environment), &view).expect("there is light");
         let distributions = LightGrid::whole_map(environment.tile_energies());
         let (on_cpu, on_gpu) = (training(), training());
         let tracer = view.tracer((&world, &environment), distributions.as_ref());
         let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
         let mut renderer =
-            Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true)
-                .expect("it fits");
+            Renderer::new(&uploaded, (&world, &environment), &view, true).expect("it fits");
         renderer.set_grid(distributions.as_ref()).expect("uploaded");
         let never = AtomicBool::new(false);
         let mut known = None;
         for paths in [0..8192, 8192..16384] {
             let cpu_rays = cpu::train(
                 &PathTracer { cache: known.as_ref(), ..tracer },
-                &rays,
                 &view,
                 paths.clone(),
                 on_cpu.sums(),

@@ -44,11 +44,10 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 
 use super::film::Film;
-use super::{Pass, View};
+use super::{Advance, Pass, View};
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::Lit;
-use crate::path::camera::CameraRays;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 #[cfg(feature = "window")]
 pub(crate) use background_compile::MaybeReady;
@@ -73,7 +72,6 @@ pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
 pub(crate) use film::DeviceFilm;
-pub(super) use progress::Advance;
 pub use uploaded_scene::UploadedScene;
 
 /// How kernels share the work of a picture.
@@ -126,8 +124,7 @@ pub(crate) struct Renderer {
 }
 
 impl Renderer {
-    /// Builds the kernels for a view of what is uploaded, with that for learning if the session `learns`; goes on
-    /// from `film` if there is one.
+    /// Builds the kernels for a view of what is uploaded, with that for learning if the session `learns`.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
@@ -135,11 +132,9 @@ impl Renderer {
         uploaded: &UploadedScene,
         lit: Lit<'_>,
         view: &View,
-        rays: &CameraRays,
-        film: Option<&Film>,
         learns: bool,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, film)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
         let kernels = renderer.own_kernels(learns);
         renderer.dispatcher.compile(&kernels)?;
         Ok(renderer)
@@ -155,20 +150,16 @@ impl Renderer {
         uploaded: &UploadedScene,
         lit: Lit<'_>,
         view: &View,
-        rays: &CameraRays,
-        film: Option<&Film>,
         learns: bool,
         until_then: impl FnOnce() -> Arc<CompileGuard>,
     ) -> Result<MaybeReady<Self>> {
-        // A film is large, and uploaded when it is wanted.
-        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, None)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
         let kernels = renderer.own_kernels(learns);
         let on = &mut renderer.dispatcher;
         match on.gpu.pipelines_or_held(on.programs(&kernels), until_then)? {
             MaybeReady::CompileGuard(held) => Ok(MaybeReady::CompileGuard(held)),
             MaybeReady::Ready(compiled) => {
                 on.take_up(&kernels, compiled);
-                film.map_or(Ok(()), |film| renderer.set_film(film))?;
                 Ok(MaybeReady::Ready(renderer))
             }
         }
@@ -180,10 +171,9 @@ impl Renderer {
         uploaded: &UploadedScene,
         lit: Lit<'_>,
         view: &View,
-        rays: &CameraRays,
         compile: impl FnOnce(&Gpu, shader::Program) -> Result<Arc<kernel_cache::Pipeline>>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, None)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
         let on = &mut renderer.dispatcher;
         let program = on.programs(&[Kernel::Render]).remove(0).1;
         on.take_up(&[Kernel::Render], vec![compile(&on.gpu, program)?]);
@@ -191,25 +181,18 @@ impl Renderer {
     }
 
     /// All but its kernels.
-    fn without_kernels(
-        uploaded: &UploadedScene,
-        lit: Lit<'_>,
-        view: &View,
-        rays: &CameraRays,
-        film: Option<&Film>,
-    ) -> Result<Self> {
-        let mut on = Dispatcher::new(uploaded, lit, view, rays)?;
+    fn without_kernels(uploaded: &UploadedScene, lit: Lit<'_>, view: &View) -> Result<Self> {
+        let mut on = Dispatcher::new(uploaded, lit, view)?;
         let (size, scale) = ([view.width, view.height], on.globals.film_scale);
         let mut renderer = Self {
-            film: Sums::new(&mut on.buffers, size, view.layers, scale, film)?,
+            film: Sums::new(&mut on.buffers, size, view.layers, scale)?,
             rendering: Rendering::new(&mut on)?,
-            progress: film.map(Progress::of).unwrap_or_default(),
+            progress: Progress::default(),
             reported_samples: 0,
             kernel_facts: KernelFacts::of(on.features),
             dispatcher: on,
         };
         renderer.set_cache(None)?;
-        renderer.reported_samples = renderer.total_samples();
         Ok(renderer)
     }
 
@@ -253,12 +236,12 @@ impl Renderer {
         if !on.features.view.contains(ViewFeatures::RADIANCE_CACHE) {
             return Ok(());
         }
-        let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
         on.globals.cache_is_known = u32::from(cache.is_some());
-        on.globals.cache_mean = mean;
+        on.globals.cache_mean = cache.map_or(Vec3::ZERO, |cache| cache.mean);
         if let Some(cache) = cache {
             on.globals.set_cells_of_cache(cache.cells(), on.globals.cache_scale);
         }
+        let slots = cache.map_or(&[][..], |cache| &cache.slots);
         let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };
         put_array(&mut on.buffers, "cache_slots", "the radiance cache", slots)?;
         on.write_globals();
@@ -406,12 +389,10 @@ pub(super) mod tests {
         let (world, environment) = crack();
         let view =
             View { sampling: Sampling::Plain, ..view(&world, DistributionOptions::ADAPTIVE) };
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
         let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
         let begin = || {
-            let renderer =
-                Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true);
+            let renderer = Renderer::new(&uploaded, (&world, &environment), &view, true);
             let mut renderer = renderer.expect("it fits");
             renderer.set_grid(grid.as_ref()).expect("uploaded");
             renderer

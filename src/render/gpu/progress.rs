@@ -83,12 +83,3 @@ impl Progress {
             + surplus
     }
 }
-
-/// What a call to render has set going.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) struct Advance {
-    /// Samples of all pixels together.
-    pub(in super::super) samples: u64,
-    /// Fewest samples of any pixel from now on.
-    pub(in super::super) least: u32,
-}

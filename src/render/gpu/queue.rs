@@ -105,7 +105,7 @@ impl Queue {
 
     /// Takes note of the samples that the device has told of; returns how many slots still held a path.
     fn take_report(&mut self, on: &Dispatcher, progress: &mut Progress) -> Option<u32> {
-        let [_, left, samples, _] = on.flights.report().filter(|_| self.is_filled)?;
+        let [_, left, samples, _] = on.flights.report.filter(|_| self.is_filled)?;
         progress.surplus += u64::from(samples.wrapping_sub(self.samples));
         self.samples = samples;
         Some(left)
@@ -120,7 +120,7 @@ impl Queue {
         if self.is_filled {
             on.settle()?;
             self.take_report(on, progress);
-            on.flights.forget_report();
+            on.flights.report = None;
             self.is_filled = false;
         }
         Ok(())
@@ -157,8 +157,7 @@ mod tests {
         grid: Option<&LightGrid>,
     ) -> Film {
         let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
-        let rays = view.rays();
-        let renderer = Renderer::new(&uploaded, (world, environment), view, &rays, None, true);
+        let renderer = Renderer::new(&uploaded, (world, environment), view, true);
         let mut renderer = renderer.expect("it fits");
         if let Rendering::Queue(queue) = &mut renderer.rendering {
             queue.groups = 7;

@@ -12,7 +12,7 @@ use std::process::Command;
 
 use ash::vk;
 
-use super::features::{Features, ViewFeatures};
+use super::features::{Features, KernelFeatures, ViewFeatures};
 use super::kernel::Kernel;
 use super::shader::{ARRAYS, ArrayPlaces, Binding, Constants, Program, SHARED_STACK_SIZE};
 use super::texels::VertexTexels;
@@ -123,7 +123,7 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        let exact = Features::by_default(&world).with_fusing();
+        let exact = Features { kernel: KernelFeatures::FUSING, ..Features::by_default(&world) };
         let cached = Features { view: exact.view | ViewFeatures::RADIANCE_CACHE, ..exact };
         let of_exact = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
         let of_exact = of_exact.chain(Kernel::OF_SHARING).map(|kernel| (kernel, exact, ""));

@@ -263,28 +263,21 @@ impl Program {
             ]);
         }
         for (index, binding) in bindings.iter().enumerate() {
-            let array = match binding {
-                Binding::Buffer { name, .. } => ARRAYS.into_iter().find(|kind| kind.name == *name),
-                Binding::Array(array) => Some(*array),
-                Binding::Tree => None,
+            let array = |name: &str| ARRAYS.into_iter().find(|kind| kind.name == name);
+            let declaration = match *binding {
+                Binding::Array(array) => array.accessor(index, places),
+                Binding::Buffer { name, .. } if let Some(array) = array(name) => {
+                    array.accessor(index, places)
+                }
+                Binding::Buffer { name, store, is_written } => {
+                    let access = if is_written { "read_write" } else { "read" };
+                    format!("@group(0) @binding({index}) var<storage, {access}> {name}: {store};\n")
+                }
+                Binding::Tree => {
+                    format!("@group(0) @binding({index}) var tree: acceleration_structure;\n")
+                }
             };
-            match (array, binding) {
-                (Some(array), _) => source.push_str(&array.accessor(index, places)),
-                (None, Binding::Buffer { name, store, is_written }) => {
-                    let access = if *is_written { "read_write" } else { "read" };
-                    let _ = writeln!(
-                        source,
-                        "@group(0) @binding({index}) var<storage, {access}> {name}: {store};"
-                    );
-                }
-                (None, Binding::Array(_)) => {}
-                (None, Binding::Tree) => {
-                    let _ = writeln!(
-                        source,
-                        "@group(0) @binding({index}) var tree: acceleration_structure;"
-                    );
-                }
-            }
+            source.push_str(&declaration);
         }
         for (text, is_needed) in files(kernel, features) {
             if is_needed {
@@ -447,6 +440,7 @@ fn keep_lines(text: &str, features: Features, source: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::super::device::MAX_STORAGE_BUFFERS;
+    use super::super::features::KernelFeatures;
     use super::*;
 
     #[test]
@@ -663,7 +657,8 @@ mod tests {
             }
             validate(Kernel::ClosestHits, features, places);
             validate(Kernel::ShadowRays, features, places);
-            validate(Kernel::Render, features.with_hardware_rays(), places);
+            let with_rays = Features { kernel: KernelFeatures::HARDWARE_RAYS, ..features };
+            validate(Kernel::Render, with_rays, places);
         }
     }
 }

@@ -24,6 +24,7 @@ const MAX_DEPTH: u32 = 96;
 const PART: usize = 1 << 16;
 
 /// A scene and a map uploaded once for any number of views.
+#[derive(Clone)]
 pub struct UploadedScene {
     pub(super) gpu: Gpu,
     pub(super) buffers: Buffers,
@@ -39,12 +40,16 @@ impl UploadedScene {
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub fn new(gpu: &Gpu, world: &World, environment: &Environment) -> Result<Self> {
-        let mut buffers = Buffers::new(gpu);
-        let mut globals = Globals::default();
-        upload_map(&mut buffers, &mut globals, environment)?;
-        let constants = upload_world(gpu, &mut buffers, &mut globals, world)?;
-        let environment = environment.clone();
-        Ok(Self { gpu: gpu.clone(), buffers, globals, constants, environment })
+        let mut uploaded = Self {
+            gpu: gpu.clone(),
+            buffers: Buffers::new(gpu),
+            globals: Globals::default(),
+            constants: Constants::default(),
+            environment: environment.clone(),
+        };
+        uploaded.put_map(environment)?;
+        uploaded.put_world(world)?;
+        Ok(uploaded)
     }
 
     /// The same scene under another map; one that is only turned or scaled is not uploaded again.
@@ -52,120 +57,127 @@ impl UploadedScene {
     /// # Errors
     /// If it does not fit on the device, with the numbers.
     pub fn relit(&self, environment: &Environment) -> Result<Self> {
-        let mut uploaded = Self {
-            gpu: self.gpu.clone(),
-            buffers: self.buffers.clone(),
-            globals: self.globals,
-            constants: self.constants,
-            environment: environment.clone(),
-        };
+        let mut uploaded = Self { environment: environment.clone(), ..self.clone() };
         // A black map was never uploaded.
         let is_there = environment.is_black() || !self.environment.is_black();
         if environment.shares_map_with(&self.environment) && is_there {
             uploaded.globals.set_environment(environment);
         } else {
-            upload_map(&mut uploaded.buffers, &mut uploaded.globals, environment)?;
+            uploaded.put_map(environment)?;
         }
         Ok(uploaded)
     }
-}
 
-/// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
-fn upload_world(
-    gpu: &Gpu,
-    buffers: &mut Buffers,
-    globals: &mut Globals,
-    world: &World,
-) -> Result<Constants> {
-    let scene = &world.scene;
-    let features = Features::of_world(world);
-    let (materials, texture_refs) = layout::materials(world);
-    let bounds = world.bvh.bounds();
-    globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-    let flags_of =
-        |triangle: u32| materials[scene.triangle_materials[triangle as usize] as usize].flags;
-    let stack_size = if gpu.has_hardware_rays() {
-        let tree = Acceleration::build(gpu, world, flags_of)?;
-        globals.opaque_triangles = tree.opaque;
-        put_instances(buffers, globals, world, &tree.instances)?;
-        put_array(buffers, "query_triangles", "the scene's geometry", &tree.triangles)?;
-        buffers.tree = Some(tree.tlas);
-        0
-    } else {
-        upload_tree(buffers, globals, world, flags_of)?
-    };
-    let vertex = VertexTexels::of(features);
-    put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
-    put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
-    put_array(buffers, "materials", "the list of materials", &materials)?;
-    if features.scene.contains(SceneFeatures::TEXTURES) {
-        put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
-        let texels = scene.images.iter().map(|image| image.texels.stored_len() as u64).sum();
-        // Part by part: those of fewer channels are copied.
-        let parts = scene.images.iter().flat_map(|image| {
-            let count = image.texels.stored_len();
-            let part = move |start| image.texels.rgba_of(start..count.min(start + PART));
-            (0..count).step_by(PART).map(part)
+    /// Uploads geometry, materials, textures and lights.
+    fn put_world(&mut self, world: &World) -> Result<()> {
+        let scene = &world.scene;
+        let features = Features::of_world(world);
+        let (materials, texture_refs) = layout::materials(world);
+        let bounds = world.bvh.bounds();
+        self.globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
+        let flags_of =
+            |triangle: u32| materials[scene.triangle_materials[triangle as usize] as usize].flags;
+        let stack_size = if self.gpu.has_hardware_rays() {
+            let tree = Acceleration::build(&self.gpu, world, flags_of)?;
+            self.globals.opaque_triangles = tree.opaque;
+            self.put_instances(world, &tree.instances)?;
+            let buffers = &mut self.buffers;
+            put_array(buffers, "query_triangles", "the scene's geometry", &tree.triangles)?;
+            buffers.tree = Some(tree.tlas);
+            0
+        } else {
+            self.put_tree(world, flags_of)?
+        };
+        let Self { buffers, globals, .. } = self;
+        let vertex = VertexTexels::of(features);
+        put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
+        put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
+        put_array(buffers, "materials", "the list of materials", &materials)?;
+        if features.scene.contains(SceneFeatures::TEXTURES) {
+            put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
+            let texels = scene.images.iter().map(|image| image.texels.stored_len() as u64).sum();
+            // Part by part: those of fewer channels are copied.
+            let parts = scene.images.iter().flat_map(|image| {
+                let count = image.texels.stored_len();
+                let part = move |start| image.texels.rgba_of(start..count.min(start + PART));
+                (0..count).step_by(PART).map(part)
+            });
+            let parts = parts.map(|part| match part {
+                Cow::Borrowed(texels) => Cow::Borrowed(bytemuck::cast_slice(texels)),
+                Cow::Owned(texels) => Cow::Owned(texels.into_flattened()),
+            });
+            buffers.put_array("texels", "the set of textures", texels, parts)?;
+        }
+        if features.scene_lights() {
+            let lights = layout::light_words(world, globals);
+            put_array(buffers, "lights", "the list of lights", &lights)?;
+            put_array(buffers, "light_nodes", "the tree of lights", &world.lights.tree.nodes)?;
+        }
+        self.constants = Constants {
+            stack_size,
+            shared_stack_size: stack_size.min(SHARED_STACK_SIZE),
+            vertex,
+            textures_in_scene: world.needs.texture_slots,
+            metres: world.scene.frame.length_in_file(1.0).to_bits(),
+            ..Constants::default()
+        };
+        Ok(())
+    }
+
+    /// Uploads the tree that kernels walk; returns how many groups of nodes a walk has to remember.
+    fn put_tree(&mut self, world: &World, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
+        let (scene, bvh) = (&world.scene, &world.bvh);
+        let meshes = scene.instances.meshes();
+        let tree = CompressedTree::build(&scene.positions, &scene.triangles, meshes, bvh, flags_of);
+        if tree.depth > MAX_DEPTH {
+            return Err(Error::new(format!(
+                "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
+                tree.depth
+            )));
+        }
+        let buffers = &mut self.buffers;
+        put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
+        put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+        self.put_instances(world, &tree.instances)?;
+        // One of each level but the root's.
+        Ok(tree.depth.max(2) - 1)
+    }
+
+    /// Uploads the instances, if there are any.
+    fn put_instances(&mut self, world: &World, instances: &[InstanceWords]) -> Result<()> {
+        if !world.needs.has(SceneFeatures::INSTANCES) {
+            return Ok(());
+        }
+        let (first, slot_log2, slots) = world.scene.instances.slots();
+        let Self { buffers, globals, .. } = self;
+        (globals.first_of_instances, globals.slot_log2) = (first, slot_log2);
+        put_array(buffers, "instance_slots", "the list of instances", slots)?;
+        put_array(buffers, "instances", "the list of instances", instances.as_flattened())
+    }
+
+    /// Uploads the map's radiance and its importance table.
+    fn put_map(&mut self, environment: &Environment) -> Result<()> {
+        let Self { buffers, globals, .. } = self;
+        globals.set_environment(environment);
+        if environment.is_black() {
+            return Ok(());
+        }
+        let map = environment.map();
+        let rows = map.pixels.chunks(map.width as usize * 64).map(|rows| {
+            let words: Vec<[u32; 2]> =
+                rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
+            Cow::Owned(bytemuck::pod_collect_to_vec(&words))
         });
-        let parts = parts.map(|part| match part {
-            Cow::Borrowed(texels) => Cow::Borrowed(bytemuck::cast_slice(texels)),
-            Cow::Owned(texels) => Cow::Owned(texels.into_flattened()),
-        });
-        buffers.put_array("texels", "the set of textures", texels, parts)?;
+        buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
+        let parts = environment.tile_sums().ok_or_else(|| {
+            let kind = environment.table_kind();
+            Error::new(format!("a summed-area table ({kind}) is for the CPU alone"))
+        })?;
+        globals.tile_sums_at = parts[0].len() as u32;
+        let words = parts.iter().map(|part| part.len() as u64).sum();
+        let bytes = parts.into_iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
+        buffers.put_array("sums", "the map's importance table", words, bytes)
     }
-    if features.scene_lights() {
-        let lights = layout::light_words(world, globals);
-        put_array(buffers, "lights", "the list of lights", &lights)?;
-        put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
-    }
-    let textures_in_scene = world.needs.texture_slots;
-    Ok(Constants {
-        stack_size,
-        shared_stack_size: stack_size.min(SHARED_STACK_SIZE),
-        vertex,
-        textures_in_scene,
-        metres: world.scene.frame.length_in_file(1.0).to_bits(),
-        ..Constants::default()
-    })
-}
-
-/// Uploads the tree that kernels walk; returns how many groups of nodes a walk has to remember.
-fn upload_tree(
-    buffers: &mut Buffers,
-    globals: &mut Globals,
-    world: &World,
-    flags_of: impl Fn(u32) -> u32,
-) -> Result<u32> {
-    let (scene, bvh) = (&world.scene, &world.bvh);
-    let meshes = scene.instances.meshes();
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles, meshes, bvh, flags_of);
-    if tree.depth > MAX_DEPTH {
-        return Err(Error::new(format!(
-            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
-            tree.depth
-        )));
-    }
-    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
-    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
-    put_instances(buffers, globals, world, &tree.instances)?;
-    // One of each level but the root's.
-    Ok(tree.depth.max(2) - 1)
-}
-
-/// Uploads the instances, if there are any.
-fn put_instances(
-    buffers: &mut Buffers,
-    globals: &mut Globals,
-    world: &World,
-    instances: &[InstanceWords],
-) -> Result<()> {
-    if !world.needs.has(SceneFeatures::INSTANCES) {
-        return Ok(());
-    }
-    let (first, slot_log2, slots) = world.scene.instances.slots();
-    (globals.first_of_instances, globals.slot_log2) = (first, slot_log2);
-    put_array(buffers, "instance_slots", "the list of instances", slots)?;
-    put_array(buffers, "instances", "the list of instances", instances.as_flattened())
 }
 
 /// Makes an array of values that take whole texels or parts of one.
@@ -179,30 +191,4 @@ pub(super) fn put_array<T: bytemuck::Pod>(
     let texel_bytes = shader::ARRAYS.iter().find(|kind| kind.name == name);
     let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.format.bytes());
     buffers.put_array(name, what, texels, std::iter::once(Cow::Borrowed(bytes)))
-}
-
-/// Uploads the map's radiance and its importance table.
-fn upload_map(
-    buffers: &mut Buffers,
-    globals: &mut Globals,
-    environment: &Environment,
-) -> Result<()> {
-    globals.set_environment(environment);
-    if environment.is_black() {
-        return Ok(());
-    }
-    let map = environment.map();
-    let rows = map.pixels.chunks(map.width as usize * 64).map(|rows| {
-        let words: Vec<[u32; 2]> = rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
-        Cow::Owned(bytemuck::pod_collect_to_vec(&words))
-    });
-    buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
-    let parts = environment.tile_sums().ok_or_else(|| {
-        let kind = environment.table_kind();
-        Error::new(format!("a summed-area table ({kind}) is for the CPU alone"))
-    })?;
-    globals.tile_sums_at = parts[0].len() as u32;
-    let words = parts.iter().map(|part| part.len() as u64).sum();
-    let bytes = parts.into_iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
-    buffers.put_array("sums", "the map's importance table", words, bytes)
 }

@@ -6,7 +6,6 @@ use std::time::Instant;
 use crate::environment::Environment;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, RenderedPaths};
-use crate::path::camera::CameraRays;
 use crate::path::{Lit, World};
 use crate::render::view_probe::{ROOM_ENCLOSURE, enclosure, middle_distance};
 use crate::render::{Figures, Sampling, View, cpu};
@@ -57,17 +56,13 @@ const MAX_MOVED: f32 = 0.5;
 
 impl Learning {
     /// An empty grid, if the view is to learn and the map has anything to learn about.
-    pub(super) fn new(
-        (world, environment): Lit<'_>,
-        view: &View,
-        rays: &CameraRays,
-    ) -> Option<Self> {
+    pub(super) fn new((world, environment): Lit<'_>, view: &View) -> Option<Self> {
         let options = view.distribution_options()?;
         if environment.is_black() || view.limits.bounces == 0 {
             return None;
         }
         let grid = SphericalGrid {
-            center: rays.position(),
+            center: view.rays().position(),
             columns: view.grid_columns,
             rows: (view.grid_columns / 2).max(1),
             faces: options.faces,
@@ -94,11 +89,11 @@ fn counts_rendered(world: &World, view: &View) -> bool {
 
 impl Tiles {
     /// Nothing learned yet.
-    pub(super) fn new(lit: Lit<'_>, view: &View, rays: &CameraRays) -> Self {
+    pub(super) fn new(lit: Lit<'_>, view: &View) -> Self {
         let (_, environment) = lit;
         let is_sampled = view.sampling != Sampling::Bsdf && !environment.is_black();
         let whole_map = is_sampled.then(|| LightGrid::whole_map(environment.tile_energies()));
-        let learning = Learning::new(lit, view, rays);
+        let learning = Learning::new(lit, view);
         Self { whole_map: whole_map.flatten(), learned: None, learning }
     }
 
@@ -148,13 +143,12 @@ impl Tiles {
         counted: &LearningGrid,
         world: &World,
         view: &View,
-        rays: &CameraRays,
     ) -> bool {
         let goes_on = view.distribution_options().is_some_and(|options| options.goes_on());
         let Some(learning) = self.learning.as_mut().filter(|_| goes_on) else { return false };
-        let moved = rays.position().distance(counted.grid.center);
-        let is_near = middle_distance(world, [view.width, view.height], rays)
-            .is_some_and(|distance| moved <= MAX_MOVED * distance);
+        let moved = view.rays().position().distance(counted.grid.center);
+        let is_near =
+            middle_distance(world, view).is_some_and(|distance| moved <= MAX_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {
             return false;
         }

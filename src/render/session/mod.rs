@@ -48,12 +48,10 @@ impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, mut view: View) -> Self {
         view.sharing = view.sharing.decided(world, &view);
-        let rays = view.rays();
-        let tiles = Tiles::new((world, environment), &view, &rays);
-        let training = CacheTraining::new((world, environment), &view, &rays);
+        let tiles = Tiles::new((world, environment), &view);
+        let training = CacheTraining::new((world, environment), &view);
         let state = SessionState {
             view,
-            rays,
             film: HostFilm::new(),
             samples: 0,
             skipped: 0,
@@ -160,9 +158,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let film = (self.state.figures.samples > 0).then(|| self.film());
-        let (view, rays) = (&self.state.view, &self.state.rays);
-        let renderer = gpu::Renderer::new(uploaded, lit, view, rays, film, learns)?;
+        let renderer = gpu::Renderer::new(uploaded, lit, &self.state.view, learns)?;
         self.move_to(renderer)
     }
 
@@ -178,15 +174,16 @@ impl<'a> Session<'a> {
         until_then: impl FnOnce() -> Arc<gpu::CompileGuard>,
     ) -> Result<Option<Weak<gpu::CompileGuard>>> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let film = (self.state.figures.samples > 0).then(|| self.film());
-        let (view, rays) = (&self.state.view, &self.state.rays);
-        match gpu::Renderer::new_or_held(uploaded, lit, view, rays, film, learns, until_then)? {
+        match gpu::Renderer::new_or_held(uploaded, lit, &self.state.view, learns, until_then)? {
             gpu::MaybeReady::CompileGuard(held) => Ok(Some(held)),
             gpu::MaybeReady::Ready(renderer) => self.move_to(renderer).map(|()| None),
         }
     }
 
     fn move_to(&mut self, mut renderer: gpu::Renderer) -> Result<()> {
+        if self.state.figures.samples > 0 {
+            renderer.set_film(self.film())?;
+        }
         renderer.set_grid(self.state.tiles.grid())?;
         renderer.set_cache(self.state.training.as_ref().and_then(CacheTraining::cache))?;
         self.gpu = Some(Box::new(renderer));
@@ -230,7 +227,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the GPU.
     pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
         let state = &mut self.state;
-        if !state.tiles.continue_from(counted, self.world, &state.view, &state.rays) {
+        if !state.tiles.continue_from(counted, self.world, &state.view) {
             return Ok(false);
         }
         state.tiles.update(self.environment, &mut state.figures);
@@ -383,10 +380,10 @@ impl<'a> Session<'a> {
         let rays = match &mut self.gpu {
             None => {
                 let tracer = state.tracer(lit, Some(counted));
-                let rays = cpu::learn(&tracer, &state.rays, &state.view, range.clone(), cancel);
+                let rays = cpu::learn(&tracer, &state.view, range.clone(), cancel);
                 if cancel.load(Ordering::Relaxed) {
-                    let SessionState { view, rays, figures, .. } = state;
-                    state.tiles.begin_again(Learning::new(lit, view, rays), figures);
+                    let learning = Learning::new(lit, &state.view);
+                    state.tiles.begin_again(learning, &mut state.figures);
                     return self.take_up_distributions();
                 }
                 rays
@@ -417,7 +414,7 @@ impl<'a> Session<'a> {
     #[cfg(feature = "window")]
     pub(crate) fn resume(lit: Lit<'a>, mut state: SessionState) -> Self {
         if state.training.is_none() {
-            state.training = CacheTraining::new(lit, &state.view, &state.rays);
+            state.training = CacheTraining::new(lit, &state.view);
         }
         Self { world: lit.0, environment: lit.1, gpu: None, state }
     }
@@ -439,7 +436,6 @@ impl<'a> Session<'a> {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
                     let rays = cpu::train(
                         &self.state.tracer((self.world, self.environment), None),
-                        &self.state.rays,
                         &self.state.view,
                         paths.clone(),
                         sums,
@@ -494,8 +490,7 @@ impl<'a> Session<'a> {
                 let mut film = state.film.take(&state.view);
                 let tracer =
                     state.tracer((self.world, self.environment), state.tiles.counted_into());
-                let (samples, rays) =
-                    cpu::render(&tracer, &state.rays, &state.view, pass, &mut film, cancel);
+                let (samples, rays) = cpu::render(&tracer, &state.view, pass, &mut film, cancel);
                 state.samples = film.min_samples();
                 state.film.put(film);
                 state.figures.rays += rays;

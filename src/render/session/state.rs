@@ -5,7 +5,6 @@ use super::host_film::HostFilm;
 use super::learning::Tiles;
 use super::noise::Noise;
 use crate::light_grid::LearningGrid;
-use crate::path::camera::CameraRays;
 use crate::path::{Lit, PathTracer};
 #[cfg(feature = "window")]
 use crate::radiance_cache::CacheFacts;
@@ -17,7 +16,6 @@ use crate::sampler::Sequence;
 /// All that a [`Session`](super::Session) has of its own.
 pub(crate) struct SessionState {
     pub(super) view: View,
-    pub(super) rays: CameraRays,
     pub(super) film: HostFilm,
     /// Fewest samples of any pixel.
     pub(super) samples: u32,

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::super::measure::Point;
 use super::super::summary::Report;
 
 /// A line for each point of each run.
@@ -37,14 +38,11 @@ pub(super) fn table(report: &Report) -> String {
                                 values.map(|v| v.to_string()).join(",")
                             },
                         );
+                        let seed = run.seed;
+                        let Point { seconds, render_seconds, samples, rays, .. } = point;
                         let _ = writeln!(
                             text,
-                            "{names},{},{},{},{},{},{errors}",
-                            run.seed,
-                            point.seconds,
-                            point.render_seconds,
-                            point.samples,
-                            point.rays
+                            "{names},{seed},{seconds},{render_seconds},{samples},{rays},{errors}"
                         );
                     }
                 }

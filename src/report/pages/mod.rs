@@ -25,17 +25,19 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     let plots = folder.join("plots");
     make_folder(&plots)?;
     let page = page::Page::new(report)?;
-    if let Some(plot) = page.overview_plot() {
+    if let Some(plot) = page.overview.as_ref().filter(|_| !report.is_long()) {
         write_text(&plots.join("speed-ups.svg"), plot)?;
     }
-    for (row, device, plot) in page.error_plots() {
-        let name = format!("{}-{}.svg", row.row.title, device.title());
-        write_text(&plots.join(file_name(&name)), plot)?;
+    for section in &page.sections {
+        for (device, plot) in &section.error_plots {
+            let name = format!("{}-{}.svg", section.row.row.title, device.title());
+            write_text(&plots.join(file_name(&name)), plot)?;
+        }
     }
-    write_text(&folder.join("report.html"), &page.html()?)
+    write_text(&folder.join("report.html"), &plots::rendered(&page)?)
 }
 
-fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_beside_and_rename(path, |file| file.write_all(text.as_bytes()))
 }
 

@@ -6,7 +6,7 @@ use super::super::plan::{Device, Method};
 use super::super::statistics::SpeedUp;
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::pictures::{Window, data_uri, developed};
-use super::plots::{Group, error_plot, rendered, speed_up_plot};
+use super::plots::{Bar, Group, error_plot, speed_up_plot};
 use super::{format, results};
 use crate::error::Result;
 
@@ -16,9 +16,9 @@ use crate::error::Result;
 pub(super) struct Page<'a> {
     report: &'a Report,
     /// The plot above all rows.
-    overview: Option<String>,
+    pub(super) overview: Option<String>,
     ablations: Vec<AblationLine<'a>>,
-    sections: Vec<Section<'a>>,
+    pub(super) sections: Vec<Section<'a>>,
 }
 
 /// A method's speed-ups over the last baseline.
@@ -33,9 +33,9 @@ struct AblationLine<'a> {
 }
 
 /// What is shown of a row.
-struct Section<'a> {
-    row: &'a RowReport,
-    error_plots: Vec<(Device, String)>,
+pub(super) struct Section<'a> {
+    pub(super) row: &'a RowReport,
+    pub(super) error_plots: Vec<(Device, String)>,
     /// Plots on the page.
     plots: Vec<String>,
     pictures: Option<Pictures<'a>>,
@@ -55,7 +55,7 @@ impl<'a> Page<'a> {
         let ablations = if report.is_long() { ablations(report) } else { Vec::new() };
         let overview = if report.is_long() {
             let mean = |(index, line): (usize, &AblationLine<'a>)| {
-                Some(Group::of_method(&line.method.name, index, line.mean?, None))
+                Some(Group::of_method(Bar::new(&line.method.name, index, line.mean?, None)))
             };
             let groups = ablations.iter().enumerate().filter_map(mean).collect();
             speed_up_plot("Geometric mean over all rows", report.last_baseline(), groups)
@@ -68,23 +68,6 @@ impl<'a> Page<'a> {
         let sections =
             report.rows.iter().map(|row| Section::new(report, row)).collect::<Result<_>>()?;
         Ok(Self { report, overview: overview?, ablations, sections })
-    }
-
-    /// The plot of all rows' speed-ups.
-    pub(super) fn overview_plot(&self) -> Option<&str> {
-        self.overview.as_deref().filter(|_| !self.report.is_long())
-    }
-
-    /// Error against time, of each row and device.
-    pub(super) fn error_plots(&self) -> impl Iterator<Item = (&RowReport, Device, &str)> {
-        self.sections.iter().flat_map(|section| {
-            section.error_plots.iter().map(|(device, plot)| (section.row, *device, plot.as_str()))
-        })
-    }
-
-    /// The whole page.
-    pub(super) fn html(&self) -> Result<String> {
-        rendered(self)
     }
 }
 
@@ -123,7 +106,8 @@ impl<'a> Section<'a> {
         for device in &row.devices {
             let group = |(index, m): (usize, &'a MethodReport)| {
                 let found = m.speed_up(report.last_baseline(), Measure::TrimmedRelMse)?;
-                Some(Group::of_method(&m.method.name, index, found.ratio, found.interval))
+                let bar = Bar::new(&m.method.name, index, found.ratio, found.interval);
+                Some(Group::of_method(bar))
             };
             let groups = device.methods.iter().enumerate().filter_map(group).collect();
             let plot = speed_up_plot(device.device.title(), report.last_baseline(), groups);

@@ -222,7 +222,8 @@ pub(super) struct Group<'a> {
     bottom: f64,
 }
 
-struct Bar<'a> {
+/// The speed-up of a method.
+pub(super) struct Bar<'a> {
     name: &'a str,
     ink: &'static str,
     ratio: f64,
@@ -251,14 +252,8 @@ impl<'a> Group<'a> {
     }
 
     /// One bar with its method's name.
-    pub(super) fn of_method(
-        name: &'a str,
-        index: usize,
-        ratio: f64,
-        interval: Option<Interval>,
-    ) -> Self {
-        let bars = vec![Bar::new(name, index, ratio, interval)];
-        Self { title: name.to_owned(), bars, ..Self::default() }
+    pub(super) fn of_method(bar: Bar<'a>) -> Self {
+        Self { title: bar.name.to_owned(), bars: vec![bar], ..Self::default() }
     }
 
     /// Places the group below `top`, and its bars in it.
@@ -275,7 +270,8 @@ impl<'a> Group<'a> {
 }
 
 impl<'a> Bar<'a> {
-    fn new(name: &'a str, index: usize, ratio: f64, interval: Option<Interval>) -> Self {
+    /// Of the method of this name and index in its plan.
+    pub(super) fn new(name: &'a str, index: usize, ratio: f64, interval: Option<Interval>) -> Self {
         Self { name, ink: ink(name, index), ratio, interval, y: 0.0 }
     }
 }

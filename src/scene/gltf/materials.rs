@@ -50,11 +50,11 @@ impl Materials {
                 Some(number) => {
                     let source = file.document.materials.get(json::Index::new(number))?;
                     let mut reader = Reader::new(file, &source, number, &mut wanted, notices);
-                    let material = reader
-                        .material(&source)
-                        .map_err(|cause| format!("material {number} ({}): {cause}", reader.name))?;
+                    reader.read(&source).map_err(|cause| {
+                        format!("material {number} ({}): {cause}", reader.material.name)
+                    })?;
                     glossy.extend(reader.glossiness.map(|factor| (materials.len(), factor)));
-                    material
+                    reader.material
                 }
             });
         }
@@ -109,6 +109,9 @@ impl Materials {
     }
 }
 
+/// A JSON object, such as an extension.
+pub(super) type Object = Map<String, Value>;
+
 /// Where a texture of the file is read.
 pub(super) struct Info {
     index: json::Index<json::Texture>,
@@ -142,7 +145,8 @@ fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
 /// Reads one material.
 pub(super) struct Reader<'a> {
     document: &'a Document<'a>,
-    name: String,
+    /// What is read so far.
+    pub(super) material: Material,
     /// Factor on the alpha of a texture that is read for roughness, and says how smooth the surface is.
     glossiness: Option<f32>,
     wanted: &'a mut Wanted,
@@ -158,13 +162,14 @@ impl<'a> Reader<'a> {
         notices: &'a mut Notices,
     ) -> Self {
         let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
-        Self { document: &file.document, name, glossiness: None, wanted, notices }
+        let material = Material { name, ..Material::default() };
+        Self { document: &file.document, material, glossiness: None, wanted, notices }
     }
 
-    fn material(&mut self, source: &json::Material) -> Fallible<Material> {
+    fn read(&mut self, source: &json::Material) -> Fallible<()> {
         let pbr = &source.pbr_metallic_roughness;
-        let mut material = Material {
-            name: self.name.clone(),
+        self.material = Material {
+            name: self.material.name.clone(),
             base_color: Vec4::from_array(self.units(pbr.base_color_factor.0)),
             metallic: self.unit(pbr.metallic_factor.0),
             roughness: self.unit(pbr.roughness_factor.0),
@@ -183,7 +188,7 @@ impl<'a> Reader<'a> {
                 Checked::Invalid => {
                     self.notices.add(format!(
                         "material {} has an alpha mode that glTF does not know: it is opaque",
-                        self.name
+                        self.material.name
                     ));
                     AlphaMode::Opaque
                 }
@@ -191,131 +196,105 @@ impl<'a> Reader<'a> {
             double_sided: source.double_sided,
             ..Material::default()
         };
-        self.texture(&mut material, Slot::BaseColor, pbr.base_color_texture.as_ref())?;
-        self.texture(
-            &mut material,
-            Slot::MetallicRoughness,
-            pbr.metallic_roughness_texture.as_ref(),
-        )?;
-        self.texture(&mut material, Slot::Normal, source.normal_texture.as_ref())?;
-        self.texture(&mut material, Slot::Emissive, source.emissive_texture.as_ref())?;
-        (material.scattering, material.scatter_anisotropy) =
-            medium::inside(&source.extras, &self.name, self.notices);
-        if let Some(extensions) = &source.extensions {
-            self.extensions(extensions, &mut material)?;
-        }
-        Ok(material)
+        self.texture(Slot::BaseColor, pbr.base_color_texture.as_ref())?;
+        self.texture(Slot::MetallicRoughness, pbr.metallic_roughness_texture.as_ref())?;
+        self.texture(Slot::Normal, source.normal_texture.as_ref())?;
+        self.texture(Slot::Emissive, source.emissive_texture.as_ref())?;
+        (self.material.scattering, self.material.scatter_anisotropy) =
+            medium::inside(&source.extras, &self.material.name, self.notices);
+        source.extensions.as_ref().map_or(Ok(()), |extensions| self.extensions(extensions))
     }
 
-    fn extensions(
-        &mut self,
-        source: &json::extensions::material::Material,
-        material: &mut Material,
-    ) -> Fallible<()> {
-        material.unlit = source.unlit.is_some();
+    fn extensions(&mut self, source: &json::extensions::material::Material) -> Fallible<()> {
+        self.material.unlit = source.unlit.is_some();
         if let Some(strength) = &source.emissive_strength {
             let strength = self.within(strength.emissive_strength.0, 0.0, BRIGHTEST);
-            material.emissive = (material.emissive * strength).min(Vec3::splat(BRIGHTEST));
+            self.material.emissive =
+                (self.material.emissive * strength).min(Vec3::splat(BRIGHTEST));
         }
         if let Some(ior) = &source.ior {
             let ior = ior.ior.0;
-            material.ior = if ior == 0.0 { 0.0 } else { self.at_least(ior, 1.0) };
+            self.material.ior = if ior == 0.0 { 0.0 } else { self.at_least(ior, 1.0) };
         }
         if let Some(specular) = &source.specular {
-            material.specular = self.unit(specular.specular_factor.0);
-            self.texture(material, Slot::Specular, specular.specular_texture.as_ref())?;
+            self.material.specular = self.unit(specular.specular_factor.0);
+            self.texture(Slot::Specular, specular.specular_texture.as_ref())?;
             let tint = specular.specular_color_factor.0;
-            material.specular_color = Vec3::from_array(tint.map(|x| self.at_least(x, 0.0)));
-            self.texture(material, Slot::SpecularColor, specular.specular_color_texture.as_ref())?;
+            self.material.specular_color = Vec3::from_array(tint.map(|x| self.at_least(x, 0.0)));
+            self.texture(Slot::SpecularColor, specular.specular_color_texture.as_ref())?;
         }
         if let Some(transmission) = &source.transmission {
-            material.transmission = self.unit(transmission.transmission_factor.0);
-            self.texture(material, Slot::Transmission, transmission.transmission_texture.as_ref())?;
+            self.material.transmission = self.unit(transmission.transmission_factor.0);
+            self.texture(Slot::Transmission, transmission.transmission_texture.as_ref())?;
         }
         if let Some(volume) = &source.volume {
-            material.thickness = self.at_least(volume.thickness_factor.0, 0.0);
-            material.attenuation_color = Vec3::from_array(self.units(volume.attenuation_color.0));
+            self.material.thickness = self.at_least(volume.thickness_factor.0, 0.0);
+            self.material.attenuation_color =
+                Vec3::from_array(self.units(volume.attenuation_color.0));
             let distance = volume.attenuation_distance.0;
             // Zero is forbidden and means, in files that have it, that nobody set it.
-            material.attenuation_distance = if distance > 0.0 { distance } else { f32::INFINITY };
+            self.material.attenuation_distance =
+                if distance > 0.0 { distance } else { f32::INFINITY };
         }
-        let object = |name: &str| source.others.get(name).and_then(Value::as_object);
-        if let Some(coat) = object("KHR_materials_clearcoat") {
-            self.clearcoat(coat, material)?;
-        }
-        if let Some(anisotropy) = object("KHR_materials_anisotropy") {
-            self.anisotropy(anisotropy, material)?;
-        }
-        if let Some(sheen) = object("KHR_materials_sheen") {
-            self.sheen(sheen, material)?;
-        }
-        if let Some(through) = object("KHR_materials_diffuse_transmission") {
-            self.diffuse_transmission(through, material)?;
-        }
-        if let Some(film) = object("KHR_materials_iridescence") {
-            self.iridescence(film, material)?;
-        }
-        if let Some(dispersion) = object("KHR_materials_dispersion") {
-            material.dispersion = self.at_least(number(dispersion, "dispersion", 0.0), 0.0);
-        }
-        if let Some(old) = object("KHR_materials_pbrSpecularGlossiness") {
-            self.specular_glossiness(old, material)?;
+        let readers: [(&str, fn(&mut Self, &Object) -> Fallible<()>); 7] = [
+            ("KHR_materials_clearcoat", Self::clearcoat),
+            ("KHR_materials_anisotropy", Self::anisotropy),
+            ("KHR_materials_sheen", Self::sheen),
+            ("KHR_materials_diffuse_transmission", Self::diffuse_transmission),
+            ("KHR_materials_iridescence", Self::iridescence),
+            ("KHR_materials_dispersion", Self::dispersion),
+            ("KHR_materials_pbrSpecularGlossiness", Self::specular_glossiness),
+        ];
+        for (name, read) in readers {
+            if let Some(object) = source.others.get(name).and_then(Value::as_object) {
+                read(self, object)?;
+            }
         }
         Ok(())
     }
 
-    fn clearcoat(&mut self, coat: &Map<String, Value>, material: &mut Material) -> Fallible<()> {
-        material.clearcoat = self.unit(number(coat, "clearcoatFactor", 0.0));
-        material.clearcoat_roughness = self.unit(number(coat, "clearcoatRoughnessFactor", 0.0));
-        self.texture(material, Slot::Clearcoat, texture(coat, "clearcoatTexture"))?;
-        self.texture(
-            material,
-            Slot::ClearcoatRoughness,
-            texture(coat, "clearcoatRoughnessTexture"),
-        )?;
+    fn clearcoat(&mut self, coat: &Object) -> Fallible<()> {
+        self.material.clearcoat = self.unit(number(coat, "clearcoatFactor", 0.0));
+        self.material.clearcoat_roughness =
+            self.unit(number(coat, "clearcoatRoughnessFactor", 0.0));
+        self.texture(Slot::Clearcoat, texture(coat, "clearcoatTexture"))?;
+        self.texture(Slot::ClearcoatRoughness, texture(coat, "clearcoatRoughnessTexture"))?;
         let normal: Option<json::material::NormalTexture> =
             coat.get("clearcoatNormalTexture").and_then(parsed);
-        material.clearcoat_normal_scale = self.finite(normal.as_ref().map_or(1.0, |map| map.scale));
-        self.texture(material, Slot::ClearcoatNormal, normal.as_ref())
+        self.material.clearcoat_normal_scale =
+            self.finite(normal.as_ref().map_or(1.0, |map| map.scale));
+        self.texture(Slot::ClearcoatNormal, normal.as_ref())
     }
 
     /// The archived specular-glossiness model: a dielectric whose F0 is the specular colour, which
     /// an infinite index of refraction (`ior` 0) expresses exactly.
-    fn specular_glossiness(
-        &mut self,
-        old: &Map<String, Value>,
-        material: &mut Material,
-    ) -> Fallible<()> {
+    fn specular_glossiness(&mut self, old: &Object) -> Fallible<()> {
         let diffuse: Option<[f32; 4]> = old.get("diffuseFactor").and_then(parsed);
-        material.base_color = Vec4::from_array(self.units(diffuse.unwrap_or([1.0; 4])));
-        self.texture(material, Slot::BaseColor, texture(old, "diffuseTexture"))?;
+        self.material.base_color = Vec4::from_array(self.units(diffuse.unwrap_or([1.0; 4])));
+        self.texture(Slot::BaseColor, texture(old, "diffuseTexture"))?;
         let specular: Option<[f32; 3]> = old.get("specularFactor").and_then(parsed);
-        material.specular_color = Vec3::from_array(self.units(specular.unwrap_or([1.0; 3])));
+        self.material.specular_color = Vec3::from_array(self.units(specular.unwrap_or([1.0; 3])));
         let glossiness = self.unit(number(old, "glossinessFactor", 1.0));
         for slot in [Slot::SpecularColor, Slot::MetallicRoughness] {
-            self.texture(material, slot, texture(old, "specularGlossinessTexture"))?;
+            self.texture(slot, texture(old, "specularGlossinessTexture"))?;
         }
-        (material.metallic, material.ior, material.roughness) = (0.0, 0.0, 1.0 - glossiness);
+        (self.material.metallic, self.material.ior, self.material.roughness) =
+            (0.0, 0.0, 1.0 - glossiness);
         self.glossiness = Some(glossiness);
         Ok(())
     }
 
     /// Reads the texture of a slot, if the file has one.
-    pub(super) fn texture(
-        &mut self,
-        material: &mut Material,
-        slot: Slot,
-        info: Option<impl Into<Info>>,
-    ) -> Fallible<()> {
+    pub(super) fn texture(&mut self, slot: Slot, info: Option<impl Into<Info>>) -> Fallible<()> {
         use Slot::{BaseColor, DiffuseTransmissionColor, Emissive, SheenColor, SpecularColor};
-        material.textures[slot as usize] = None;
+        self.material.textures[slot as usize] = None;
         let Some(info) = info.map(Into::<Info>::into) else { return Ok(()) };
         let transform = info.transform.as_ref();
         let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
         if uv_set > 1 {
             self.notices.add(format!(
                 "material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read",
-                self.name
+                self.material.name
             ));
             return Ok(());
         }
@@ -323,7 +302,7 @@ impl<'a> Reader<'a> {
             slot,
             BaseColor | DiffuseTransmissionColor | Emissive | SheenColor | SpecularColor
         );
-        material.textures[slot as usize] = Some(Box::new(TextureRef {
+        self.material.textures[slot as usize] = Some(Box::new(TextureRef {
             texture: self.wanted.add(self.document, info.index, srgb)?,
             uv_set: uv_set as u8,
             transform: transform.map_or(Affine2::IDENTITY, uv_transform),
@@ -352,7 +331,7 @@ impl<'a> Reader<'a> {
         if !(least..=most).contains(&value) {
             self.notices.add(format!(
                 "material {} has factors outside their range, which are clamped",
-                self.name
+                self.material.name
             ));
         }
         value.clamp(least, most)
@@ -370,10 +349,10 @@ fn uv_transform(transform: &TextureTransform) -> Affine2 {
     if affine.is_finite() { affine } else { Affine2::IDENTITY }
 }
 
-pub(super) fn number(object: &Map<String, Value>, key: &str, default: f32) -> f32 {
+pub(super) fn number(object: &Object, key: &str, default: f32) -> f32 {
     object.get(key).and_then(Value::as_f64).map_or(default, |value| value as f32)
 }
 
-pub(super) fn texture(object: &Map<String, Value>, key: &str) -> Option<Info> {
+pub(super) fn texture(object: &Object, key: &str) -> Option<Info> {
     object.get(key).and_then(parsed).map(|info: json::texture::Info| Info::from(&info))
 }

@@ -94,7 +94,7 @@ fn look_ups(environment: &Environment) -> Vec<Probe<'_>> {
                 let off_y = off(right.row, right.down, row, down);
                 let off = off_x.min(width - off_x).max(off_y);
                 // Down a row, in units of the last place of the distance from its pole.
-                let edges = environment.patches().rows()[right.row as usize];
+                let edges = environment.patches.rows[right.row as usize];
                 let bound = 4.0 * f32::EPSILON * (width + 1.0 + edges.top / edges.extent.abs());
                 t.check(off <= bound, || format!("off by {off:e} patches"));
                 t.check(column < map.width && row < rows, || "not on the map".to_owned());

@@ -173,14 +173,14 @@ fn run(fixture: &Fixture, preludes: &[&str], probes: &[Probe<'_>], places: Place
     if places == Places::Other {
         gpu = gpu.with_arrays_in_buffers();
     }
-    let Fixture { world, environment, view, rays, grid } = fixture;
+    let Fixture { world, environment, view, grid, .. } = fixture;
     let mut uploaded = UploadedScene::new(&gpu, world, environment).expect("it fits");
     if places == Places::Other {
         uploaded.constants.shared_stack_size = 1;
         assert!(uploaded.constants.stack_size > 1, "the tree is deep enough");
     }
     let mut renderer =
-        Renderer::with_kernel(&uploaded, (world, environment), view, rays, |gpu, program| {
+        Renderer::with_kernel(&uploaded, (world, environment), view, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
         })
         .expect("it compiles");
