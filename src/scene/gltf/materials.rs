@@ -153,6 +153,9 @@ pub(super) struct Reader<'a> {
     notices: &'a mut Notices,
 }
 
+/// Reads what an extension says of a material.
+type ReadExtension<'a> = fn(&mut Reader<'a>, &Object) -> Fallible<()>;
+
 impl<'a> Reader<'a> {
     fn new(
         file: &'a File<'_>,
@@ -236,7 +239,7 @@ impl<'a> Reader<'a> {
             self.material.attenuation_distance =
                 if distance > 0.0 { distance } else { f32::INFINITY };
         }
-        let readers: [(&str, fn(&mut Self, &Object) -> Fallible<()>); 7] = [
+        let readers: [(&str, ReadExtension<'a>); 7] = [
             ("KHR_materials_clearcoat", Self::clearcoat),
             ("KHR_materials_anisotropy", Self::anisotropy),
             ("KHR_materials_sheen", Self::sheen),
