@@ -73,7 +73,9 @@ impl Preview {
     /// Whether the last copy of a session's film does not serve on, by its age where it is shown `in_place`.
     fn is_stale(&self, role: usize, in_place: Option<&(Gpu, DeviceFilm)>, rests: bool) -> bool {
         let serves = |copy: &FilmCopy| match (&copy.of, in_place) {
-            (Some(read), Some(of)) => is_same(read, of) && copy.at.elapsed() < copy.gap,
+            (Some((gpu, film)), Some((on, of))) => {
+                gpu.is_same(on) && film == of && copy.at.elapsed() < copy.gap
+            }
             // Before pixels everywhere have a sample there is nothing to be seen.
             (None, None) => rests && copy.session.film.is_begun(),
             _ => false,
@@ -179,10 +181,6 @@ impl Preview {
         let copy = copy.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
         Some(self.cached_copy.insert(copy).clone())
     }
-}
-
-fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
-    gpu.is_same(&other.0) && *film == other.1
 }
 
 /// Time until something that took `cost` may be done again.

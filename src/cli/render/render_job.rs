@@ -111,22 +111,18 @@ impl RenderJob {
         let (facts, film) = read_film(path)?;
         let advice = "remove it or name another";
         if let Some(difference) = facts.difference(&self.picture) {
-            return Err(Error::at(
-                path,
-                format!(
-                    "is the checkpoint of another picture, which differs in {difference}: {advice}"
-                ),
-            ));
+            let cause = format!(
+                "is the checkpoint of another picture, which differs in {difference}: {advice}"
+            );
+            return Err(Error::at(path, cause));
         }
         let is_of_part =
             facts.part == self.part && (self.part == Part::WHOLE || facts.samples == self.samples);
         let is_alike = (film.width, film.height) == (view.width, view.height)
             && film.has_layers() == view.layers;
         if !is_of_part || !is_alike {
-            return Err(Error::at(
-                path,
-                format!("is the checkpoint of {}: {advice}", facts.share()),
-            ));
+            let cause = format!("is the checkpoint of {}: {advice}", facts.share());
+            return Err(Error::at(path, cause));
         }
         self.target = facts.target;
         self.awaited = Some(self.awaited(film, Some(facts.figures), facts.noted));
