@@ -182,7 +182,8 @@ pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
     let id = ui.color_edit_button_rgb(&mut chosen).id.with("hex");
     let own = hex_of_color(Vec3::from(*color));
     let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.clone());
-    let field = ui.add(TextEdit::singleline(&mut text).desired_width(74.0));
+    let font = FontId::proportional(12.0);
+    let field = ui.add(TextEdit::singleline(&mut text).desired_width(58.0).font(font));
     if field.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
     } else {
