@@ -183,7 +183,7 @@ pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
     let own = hex_of_color(Vec3::from(*color));
     let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.clone());
     let font = FontId::proportional(12.0);
-    let field = ui.add(TextEdit::singleline(&mut text).desired_width(58.0).font(font));
+    let field = ui.add(TextEdit::singleline(&mut text).desired_width(65.0).font(font));
     if field.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
     } else {
