@@ -18,6 +18,11 @@ pub fn srgb_from_linear(x: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// Bytes of sRGB of a linear colour; what lies outside of `[0,1]` is clipped.
+pub(crate) fn srgb8_from_linear(color: Vec3) -> [u8; 3] {
+    color.to_array().map(|x| (255.0 * srgb_from_linear(x)).round() as u8)
+}
+
 /// sRGB transfer function, linear from display, both in `[0,1]` (IEC 61966-2-1).
 pub fn linear_from_srgb(x: f32) -> f32 {
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::view::View;
 use crate::color::luminance;
 use crate::light_grid::LightGrid;
-use crate::path::{Lit, PathLimits};
+use crate::path::{Lit, PathLimits, PathTracer};
 use crate::sampler::Sampler;
 
 /// Paths traced for a pixel.
@@ -65,21 +65,24 @@ impl LightParts {
         let size = Vec2::new(view.width as f32, view.height as f32);
         let pixel = (place * size).floor().min(size - 1.0);
         let bounces = [0, 1, view.limits.bounces].map(|bounces| bounces.min(view.limits.bounces));
+        let [by_all, by_lamps] = [environment, &black].map(|environment| {
+            let tracer = view.tracer((world, environment), grid);
+            bounces.map(|bounces| PathTracer {
+                layers: false,
+                limits: PathLimits { bounces, ..view.limits },
+                ..tracer
+            })
+        });
         let of_path = |path: u32| {
             let mut camera = Sampler::new(SEED, 0, path);
             let [in_pixel, in_lens] = [(); 2].map(|()| Vec2::from(camera.next_pair()));
             let ray = rays.ray(pixel + in_pixel, in_lens);
-            let by = |environment| {
-                bounces.map(|bounces| {
-                    let mut tracer = view.tracer((world, environment), grid);
-                    tracer.layers = false;
-                    tracer.limits = PathLimits { bounces, ..view.limits };
-                    let sampler = Sampler::new(SEED, 1, path);
-                    f64::from(luminance(tracer.radiance(ray, sampler).radiance))
-                })
+            let found = |tracer: &PathTracer<'_>| {
+                let sampler = Sampler::new(SEED, 1, path);
+                f64::from(luminance(tracer.radiance(ray, sampler).radiance))
             };
-            let all = by(environment);
-            let lamps = if has_lamps { by(&black) } else { [0.0; 3] };
+            let all = by_all.each_ref().map(found);
+            let lamps = if has_lamps { by_lamps.each_ref().map(found) } else { [0.0; 3] };
             let [direct, reflected] = [1, 2].map(|i| all[i] - all[i - 1]);
             let [direct_lamps, reflected_lamps] = [1, 2].map(|i| lamps[i] - lamps[i - 1]);
             let (direct_map, reflected_map) = (direct - direct_lamps, reflected - reflected_lamps);

@@ -168,9 +168,7 @@ pub(crate) fn color_of_hex(text: &str) -> Result<Vec3, String> {
 
 /// Linear RGB as `#rrggbb`.
 pub(crate) fn hex_of_color(color: Vec3) -> String {
-    let [r, g, b] = color
-        .to_array()
-        .map(|c| (255.0 * color::srgb_from_linear(c.clamp(0.0, 1.0))).round() as u8);
+    let [r, g, b] = color::srgb8_from_linear(color);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 

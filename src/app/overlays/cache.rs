@@ -8,7 +8,7 @@ use super::overlay::Overlay;
 use super::painted::{Legend, Painted, Range, scaled};
 use super::palette;
 use crate::app::document::Look;
-use crate::color::srgb_from_linear;
+use crate::color::srgb8_from_linear;
 use crate::radiance_cache::{CacheFacts, KnownCell};
 use crate::render::surface_map::{Spot, SurfaceMap};
 
@@ -46,7 +46,7 @@ pub(super) fn paint(
 fn develop(radiance: Vec3, (look, automatic_ev): (Look, f32)) -> [u8; 3] {
     let balanced = (look.white_balance.matrix() * radiance).max(Vec3::ZERO);
     let display = look.curve.apply(balanced * look.total_ev(automatic_ev).exp2());
-    display.to_array().map(|v| (255.0 * srgb_from_linear(v)).round() as u8)
+    srgb8_from_linear(display)
 }
 
 fn levels(cells: &[Option<KnownCell>]) -> Painted {
@@ -81,6 +81,7 @@ pub fn length(metres: f32) -> String {
 mod tests {
     use super::*;
     use crate::app::document::Document;
+    use crate::color::srgb_from_linear;
     use crate::radiance_cache::{CacheCells, RadianceSums};
     use crate::tone::{ToneCurve, WhiteBalance};
 
