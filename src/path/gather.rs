@@ -29,6 +29,7 @@ impl Path<'_> {
     }
 
     /// Draws the random numbers of next event estimation, and chooses tiles of the map by them.
+    #[inline(always)]
     pub(super) fn choose_lights(&mut self, vertex: &Vertex<'_>) -> ChosenLights {
         let mut chosen = ChosenLights::default();
         debug_assert!(self.map_samples as usize <= chosen.of_map.len(), "all are drawn");

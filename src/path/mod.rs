@@ -227,8 +227,9 @@ impl<'a> Path<'a> {
     /// Follows the path to its end.
     fn run(&mut self) {
         let mut own_bsdf = None;
-        while let Some(vertex) = self.next_vertex(&mut own_bsdf) {
-            if self.ends_in_cache(&vertex) || !self.visit(&vertex) {
+        // By reference: a vertex is too large to be moved for nothing.
+        while let Some(ref vertex) = self.next_vertex(&mut own_bsdf) {
+            if self.ends_in_cache(vertex) || !self.visit(vertex) {
                 break;
             }
         }
@@ -283,23 +284,25 @@ impl<'a> Path<'a> {
         'a: 'v,
     {
         loop {
-            let point = match self.next_arrival()? {
-                Arrival::InMedium(vertex) => return Some(vertex),
-                Arrival::AtSurface(point) => point,
-            };
-            let bsdf = self.bsdf_at(&point)?;
-            if bsdf.is_delta_only() {
-                let interface = self.vertex_at(&point, &bsdf);
-                if !self.passes_interface(&interface) {
-                    return None;
+            // By reference: a point is large, too.
+            match self.next_arrival() {
+                None => return None,
+                Some(Arrival::InMedium(vertex)) => return Some(vertex),
+                Some(Arrival::AtSurface(ref point)) => {
+                    let bsdf = self.bsdf_at(point)?;
+                    if !bsdf.is_delta_only() {
+                        let bsdf = match bsdf {
+                            Cow::Borrowed(ready) => ready,
+                            Cow::Owned(own) => own_bsdf.insert(own),
+                        };
+                        return Some(self.vertex_at(point, bsdf));
+                    }
+                    let interface = self.vertex_at(point, &bsdf);
+                    if !self.passes_interface(&interface) {
+                        return None;
+                    }
                 }
-                continue;
             }
-            let bsdf = match bsdf {
-                Cow::Borrowed(ready) => ready,
-                Cow::Owned(own) => own_bsdf.insert(own),
-            };
-            return Some(self.vertex_at(&point, bsdf));
         }
     }
 
@@ -324,6 +327,7 @@ impl<'a> Path<'a> {
     }
 
     /// Follows the ray to where it is not passed on straight; adds what is emitted on the way.
+    #[inline(always)]
     fn next_arrival(&mut self) -> Option<Arrival<'a>> {
         self.travelled = 0.0;
         self.is_clear = true;
@@ -421,6 +425,7 @@ impl<'a> Path<'a> {
     }
 
     /// How the surface scatters light; `None` if it is unlit: then it is seen as it is.
+    #[inline(always)]
     fn bsdf_at(&mut self, point: &SurfacePoint<'_>) -> Option<Cow<'a, Bsdf>> {
         let (world, parameters) = (self.tracer.world, &point.parameters);
         let mut bsdf = world.material(point.material).bsdf(point);
@@ -526,7 +531,12 @@ impl<'a> Path<'a> {
     fn choose_onward(&mut self, vertex: &Vertex<'_>) -> Option<Onward> {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => {
-                let [lobe, _] = self.sampler.next_pair();
+                let lobe = if surface.bsdf().is_lambert() {
+                    self.sampler.skip(1);
+                    0.0
+                } else {
+                    self.sampler.next_pair()[0]
+                };
                 let [x, y] = self.sampler.next_pair();
                 surface.onward(Vec3::new(lobe, x, y))
             }

@@ -184,7 +184,7 @@ impl World {
     }
 
     /// The surface that a ray along `direction` has hit.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint<'_> {
         let shared = &self.material_of(hit).shared;
         SurfacePoint::with_shared(&self.scene, shared, hit.triangle, hit.barycentric, direction)

@@ -245,7 +245,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// The same, given what all points of the triangle's material have in common.
-    #[inline]
+    #[inline(always)]
     pub fn with_shared(
         scene: &Scene,
         shared: &'a SharedParameters,
