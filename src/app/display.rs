@@ -67,10 +67,17 @@ impl Display {
         compared: Option<Comparison>,
     ) {
         let look = &document.look;
+        let request = &snapshot.request;
+        // Overlays and what is beside a picture wait for it.
+        let is_alone = overlay.is_none() && compared.is_none() && snapshot.plain.is_none();
+        let is_ahead = |latest: &Arc<Request>| match latest.moving {
+            true => latest.view != request.view,
+            false => is_alone && latest.previews && request.restarts(latest),
+        };
         self.presenter.order(Order {
             developer: Arc::clone(&self.screen.developer),
             snapshot: Arc::clone(snapshot),
-            ahead: latest.filter(|latest| latest.moving && latest.view != snapshot.request.view),
+            ahead: latest.filter(is_ahead),
             denoiser: look.denoise.then(|| look.denoiser.found()),
             metered: look.auto_exposure.then_some(look.white_balance),
             overlay,

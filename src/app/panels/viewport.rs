@@ -278,7 +278,8 @@ fn picture(
     let recipe = Recipe::new(&shown.picture, overlay, settings, number);
     let changes = changes(ui, &shown.picture, scope);
     let request = &shown.order.snapshot.request;
-    let of = (Arc::clone(&request.world.geometry), request.view.camera.clone());
+    let latest = shown.order.latest();
+    let of = (Arc::clone(&latest.world.geometry), latest.view.camera.clone());
     if request.view.crop.is_none() {
         scope.textures.main_of = (!shown.order.covers_now()).then_some(of);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::order::Order;
@@ -68,6 +69,23 @@ impl Carried {
             self.keep(&order.snapshot, completed.image.as_ref());
         }
         completed
+    }
+
+    /// What is seen of the last picture in a view that is asked for by now; `None` if that is less than half.
+    pub(super) fn ahead(&self, order: &Order) -> Option<Image> {
+        let request = order.ahead.as_ref()?;
+        let is_of_use =
+            |last: &&Whole| last.request.is_seen_like(request) && last.request.view != request.view;
+        let last = self.last.as_ref().filter(is_of_use)?;
+        let view = carried_view(&request.view);
+        let seen = last.keyframe.seen_in(&view, None);
+        let colors: Vec<Vec3> = seen.iter().flatten().map(|color| Vec3::from(*color)).collect();
+        if 2 * colors.len() < seen.len() {
+            return None;
+        }
+        let mean = colors.iter().sum::<Vec3>() / colors.len() as f32;
+        let elsewhere = Image { width: 1, height: 1, pixels: vec![mean.into()] };
+        Some(under(&seen, &elsewhere, [view.width, view.height]))
     }
 
     /// Keeps what is seen, if it is a whole picture at rest.
@@ -284,6 +302,22 @@ mod tests {
         assert_ne!(*of_truth(&carried, &few), few.image());
         carried.keep(&snapshot(&rest, &many), None);
         assert_eq!(*of_truth(&carried, &few), few.image());
+        // A camera that jumps: what it will see is known, unless it turns away.
+        let mut carried = Carried::default();
+        carried.keep(&snapshot(&still, &film), None);
+        let ahead = |change: &dyn Fn(&mut View)| {
+            let mut request = still.clone();
+            change(&mut request.view);
+            let ahead = Some(Arc::new(request));
+            carried.ahead(&Order { ahead, ..order(&still, &film) })
+        };
+        let aside = ahead(&|view| view.camera.world_from_camera.translation.x += 0.1);
+        let aside = aside.expect("most is seen");
+        assert_eq!((aside.width, aside.height), (48, 36));
+        assert!(aside.pixels.iter().all(|pixel| Vec3::from(*pixel).is_finite()));
+        let turned = glam::Affine3A::from_rotation_y(3.0);
+        let away = ahead(&|view| view.camera.world_from_camera.matrix3 *= turned.matrix3);
+        assert!(away.is_none() && ahead(&|_| ()).is_none(), "nothing of it is seen, or all");
         // A window of another size.
         let mut carried = Carried::default();
         carried.keep(&snapshot(&still, &film), None);

@@ -14,6 +14,7 @@ use crate::app::worker::{Request, Snapshot};
 use crate::develop::{Developer, LinearPicture};
 use crate::environment::Environment;
 use crate::error::Result;
+use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::render::surface_map::SurfaceMap;
 use crate::tone::WhiteBalance;
@@ -28,13 +29,17 @@ impl<K, V> Default for Last<K, V> {
 }
 
 impl<K: PartialEq, V: Clone> Last<K, V> {
+    fn is_of(&self, key: &K) -> bool {
+        self.0.as_ref().is_some_and(|(last, _)| last == key)
+    }
+
     fn or_make(&mut self, key: K, make: impl FnOnce() -> Result<V>) -> Result<V> {
         self.or_try(key, || make().map(Some)).map(|made| made.expect("it was made"))
     }
 
     /// The same where nothing may be made.
     fn or_try(&mut self, key: K, make: impl FnOnce() -> Result<Option<V>>) -> Result<Option<V>> {
-        if self.0.as_ref().is_none_or(|(last, _)| *last != key) {
+        if !self.is_of(&key) {
             let Some(value) = make()? else { return Ok(None) };
             self.0 = Some((key, value));
         }
@@ -61,6 +66,8 @@ pub(super) struct Memory {
     /// The last view of a movement; how many pixels wide its picture was, and of how many samples.
     moved: Option<(Arc<Request>, u32, u64)>,
     recent: Recent,
+    /// Automatic stops of the picture that was shown last.
+    automatic_ev: f32,
     uploads: Uploads,
 }
 
@@ -81,6 +88,23 @@ struct Uploads {
     overlay: Last<OverlayKey, Option<Painted>>,
 }
 
+/// A picture with nothing beside or over it.
+fn shown(order: &Order, prepared: Prepared, automatic_ev: f32) -> Shown {
+    let Prepared { picture, image, is_carried, failure } = prepared;
+    Shown {
+        order: order.presented(),
+        picture,
+        image,
+        is_carried,
+        other: None,
+        automatic_ev,
+        painted: None,
+        failure,
+        difference: None,
+        uncompared: None,
+    }
+}
+
 impl Memory {
     /// Fails only if the device does; `None` if it was cancelled, or what is shown is better.
     pub(super) fn present(&mut self, order: &Order, cancel: &AtomicBool) -> Result<Option<Shown>> {
@@ -93,10 +117,20 @@ impl Memory {
         if order.latest().moving {
             let film = &order.snapshot.main.film;
             self.moved = Some((Arc::clone(order.latest()), film.width, film.total_samples()));
-        } else if self.is_coarse(&order.snapshot) {
+        } else if order.ahead.is_none() && self.is_coarse(&order.snapshot) {
             return Ok(None);
         }
         let source = Source::main(order);
+        if let Some((image, automatic_ev)) = self.ahead(order, &source) {
+            // It is none of the rendered picture's own light.
+            let prepared = Prepared { is_carried: true, ..Prepared::of(&developer, image) };
+            developer.gpu().check()?;
+            let automatic_ev = order.metered.map_or(0.0, |_| automatic_ev);
+            return Ok(Some(shown(order, prepared, automatic_ev)));
+        }
+        if order.is_left() {
+            return Ok(None);
+        }
         let prepare = || match self.recent.come_back(order) {
             Some((image, is_carried)) => {
                 Ok(Some(Prepared { is_carried, ..Prepared::of(&developer, image) }))
@@ -110,9 +144,6 @@ impl Memory {
         let complete = || Ok(self.carried.carry(order, own));
         let Prepared { mut picture, image, is_carried, mut failure } =
             self.uploads.completed.or_make(key, complete)?;
-        if let Some(image) = image.as_ref().filter(|_| order.snapshot.is_lasting()) {
-            self.recent.keep(order, image, is_carried);
-        }
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(order) {
                 return Ok(ev);
@@ -123,6 +154,11 @@ impl Memory {
             };
             self.uploads.metered.or_make((source.key(), white_balance), meter)
         })?;
+        self.automatic_ev = automatic_ev;
+        let is_own = order.ahead.is_none() && order.snapshot.is_lasting();
+        if let Some(image) = image.as_ref().filter(|_| is_own) {
+            self.recent.keep(order, image, (is_carried, automatic_ev));
+        }
         if order.snapshot.request.view.crop.is_none() {
             self.whole = order.metered.map(|white_balance| Metered {
                 environment: Arc::clone(&order.snapshot.request.environment),
@@ -165,18 +201,19 @@ impl Memory {
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
         developer.gpu().check()?;
-        Ok(Some(Shown {
-            order: order.presented(),
-            picture,
-            image,
-            is_carried,
-            other,
-            difference,
-            uncompared,
-            automatic_ev,
-            painted,
-            failure,
-        }))
+        let prepared = Prepared { picture, image, is_carried, failure };
+        let shown = shown(order, prepared, automatic_ev);
+        Ok(Some(Shown { other, difference, uncompared, painted, ..shown }))
+    }
+
+    /// What was asked for by now as it was left or, if it never was, as it is seen from where the camera was; and the
+    /// automatic stops of that picture. A movement shows more, if the picture before it is ready.
+    fn ahead(&self, order: &Order, source: &Source) -> Option<(Arc<Image>, f32)> {
+        if order.latest().moving && self.uploads.picture.is_of(&source.key()) {
+            return None;
+        }
+        let carried = || Some((Arc::new(self.carried.ahead(order)?), self.automatic_ev));
+        self.recent.ahead(order).or_else(carried)
     }
 
     /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or

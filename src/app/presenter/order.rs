@@ -20,7 +20,7 @@ pub(crate) struct Order {
     pub(in crate::app) developer: Arc<Developer>,
     /// The film.
     pub snapshot: Arc<Snapshot>,
-    /// The view of a moving camera that is asked for by now, if that is another one.
+    /// What is asked for by now, if that may be shown before it is rendered.
     pub ahead: Option<Arc<Request>>,
     /// What takes noise out, if anything shall.
     pub denoiser: Option<Denoiser>,
@@ -64,8 +64,13 @@ impl Order {
     }
 
     /// What the picture is to be of.
-    pub(super) fn latest(&self) -> &Arc<Request> {
+    pub(in crate::app) fn latest(&self) -> &Arc<Request> {
         self.ahead.as_ref().unwrap_or(&self.snapshot.request)
+    }
+
+    /// What is asked for by now, unless the camera moves.
+    pub(super) fn still_ahead(&self) -> Option<&Arc<Request>> {
+        self.ahead.as_ref().filter(|ahead| !ahead.moving)
     }
 
     /// Whether what is kept is shown where the picture that is rendered would be.
@@ -83,8 +88,19 @@ impl Order {
 
     /// Whether it is of the work of an order before it, or of the same movement.
     pub(super) fn is_same_work(&self, before: &Self) -> bool {
-        let [request, old] = [self, before].map(|order| &order.snapshot.request);
+        let [request, old] = [self, before].map(Self::viewed);
         Arc::ptr_eq(request, old) || (request.moving && old.moving)
+    }
+
+    /// Whether nobody wants to see from where the picture was rendered any more.
+    pub(super) fn is_left(&self) -> bool {
+        self.still_ahead().is_some_and(|ahead| ahead.view != self.snapshot.request.view)
+    }
+
+    /// Whose view is to be shown. While light is turned each picture is late, and is shown nevertheless.
+    fn viewed(&self) -> &Arc<Request> {
+        let request = &self.snapshot.request;
+        self.ahead.as_ref().filter(|ahead| ahead.view != request.view).unwrap_or(request)
     }
 
     /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
@@ -181,5 +197,14 @@ pub(super) mod tests {
         assert!(!order(&moving, 1).only_follows(&order(&still, 1)), "off it goes");
         assert!(order(&later, 1).only_follows(&order(&moving, 1)), "on it goes");
         assert!(!order(&still, 1).only_follows(&order(&later, 1)), "there it stays");
+
+        // What is asked for by now, though it is not rendered yet.
+        let mut other = (*still).clone();
+        other.view.camera.world_from_camera.translation.x += 1.0;
+        let ahead = |request| Order { ahead: Some(Arc::new(request)), ..order(&still, 2) };
+        let elsewhere = ahead(other);
+        assert!(elsewhere.is_left() && !elsewhere.is_same_work(&order(&still, 2)));
+        let relit = ahead(Request { run: 1, ..(*still).clone() });
+        assert!(!relit.is_left() && relit.is_same_work(&order(&still, 2)), "it is seen meanwhile");
     }
 }

@@ -21,31 +21,46 @@ struct Picture {
     denoiser: Option<Denoiser>,
     image: Arc<Image>,
     is_carried: bool,
+    automatic_ev: f32,
 }
 
 impl Recent {
     /// Keeps what was shown for an order, in place of what there was of the same request; pictures of other scenes go.
-    pub(super) fn keep(&mut self, order: &Order, image: &Arc<Image>, is_carried: bool) {
+    pub(super) fn keep(
+        &mut self,
+        order: &Order,
+        image: &Arc<Image>,
+        (is_carried, automatic_ev): (bool, f32),
+    ) {
         let request = Arc::clone(&order.snapshot.request);
         self.0.retain(|kept| {
             Arc::ptr_eq(&kept.request.world, &request.world)
                 && !kept.request.is_resumed_by(&request)
         });
         let (denoiser, image) = (order.denoiser, Arc::clone(image));
-        self.0.push_front(Picture { request, denoiser, image, is_carried });
+        self.0.push_front(Picture { request, denoiser, image, is_carried, automatic_ev });
         self.0.truncate(COUNT);
     }
 
     /// What was shown when an order's picture was left, if it is the first order since, and whether that was carried.
     pub(super) fn come_back(&self, order: &Order) -> Option<(Arc<Image>, bool)> {
         let request = &order.snapshot.request;
-        let is_it = |kept: &&Picture| {
+        let kept = self.of(request, order.denoiser).filter(|_| order.snapshot.is_lasting())?;
+        Some((Arc::clone(&kept.image), kept.is_carried))
+    }
+
+    /// What was shown when the picture that is asked for by now was left, and its automatic stops.
+    pub(super) fn ahead(&self, order: &Order) -> Option<(Arc<Image>, f32)> {
+        let kept = self.of(order.still_ahead()?, order.denoiser)?;
+        Some((Arc::clone(&kept.image), kept.automatic_ev))
+    }
+
+    fn of(&self, request: &Arc<Request>, denoiser: Option<Denoiser>) -> Option<&Picture> {
+        self.0.iter().find(|kept| {
             kept.request.is_resumed_by(request)
                 && !Arc::ptr_eq(&kept.request, request)
-                && kept.denoiser == order.denoiser
-        };
-        let kept = self.0.iter().find(is_it).filter(|_| order.snapshot.is_lasting())?;
-        Some((Arc::clone(&kept.image), kept.is_carried))
+                && kept.denoiser == denoiser
+        })
     }
 }
 
@@ -67,20 +82,32 @@ mod tests {
         let left = Arc::new(request_of("open", [12, 8]));
         let image = Arc::new(film(12, 1, 1).image());
         let mut recent = Recent::default();
-        recent.keep(&order(&left), &image, true);
+        recent.keep(&order(&left), &image, (true, 2.0));
         assert!(recent.come_back(&order(&left)).is_none(), "it goes on");
         let again = Arc::new((*left).clone());
         let (found, is_carried) = recent.come_back(&order(&again)).expect("it is the same picture");
         assert!(Arc::ptr_eq(&found, &image) && is_carried);
+        // It is not rendered yet.
+        let mut elsewhere = (*left).clone();
+        elsewhere.view.camera.world_from_camera.translation.x += 1.0;
+        let ahead = |request: &Arc<Request>| Order {
+            ahead: Some(Arc::clone(request)),
+            ..order(&Arc::new(elsewhere.clone()))
+        };
+        let (found, stops) = recent.ahead(&ahead(&again)).expect("it is asked for");
+        assert!(Arc::ptr_eq(&found, &image) && stops == 2.0);
+        assert!(recent.ahead(&order(&again)).is_none(), "it is there");
+        let moving = Arc::new(Request { moving: true, ..(*left).clone() });
+        assert!(recent.ahead(&ahead(&moving)).is_none(), "the camera goes on");
         let raw = Order { denoiser: None, ..order(&again) };
         assert!(recent.come_back(&raw).is_none(), "with its noise it is another");
         let mut moved = (*left).clone();
         moved.view.camera.world_from_camera.translation.x += 1.0;
         assert!(recent.come_back(&order(&Arc::new(moved))).is_none());
-        recent.keep(&order(&again), &image, false);
+        recent.keep(&order(&again), &image, (false, 2.0));
         assert_eq!(recent.0.len(), 1, "one of each");
         // Another scene.
-        recent.keep(&order(&Arc::new(request_of("crack", [12, 8]))), &image, false);
+        recent.keep(&order(&Arc::new(request_of("crack", [12, 8]))), &image, (false, 2.0));
         assert_eq!(recent.0.len(), 1);
     }
 }

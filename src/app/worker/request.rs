@@ -43,7 +43,7 @@ pub(crate) struct Request {
 
 impl Request {
     /// Whether what is rendered for `self` is of no use for `new`.
-    pub(super) fn restarts(&self, new: &Self) -> bool {
+    pub(in crate::app) fn restarts(&self, new: &Self) -> bool {
         !Arc::ptr_eq(&self.world, &new.world)
             || !Arc::ptr_eq(&self.environment, &new.environment)
             || self.view != new.view
