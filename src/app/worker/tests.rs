@@ -189,7 +189,7 @@ fn the_cpu_goes_on_until_a_gpu_is_ready() {
         counts.extend(snapshot.map(|snapshot| snapshot.now.samples));
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(counts.len() > 3, "it stood still: {counts:?}");
+    assert!(counts.len() > 1, "it stood still: {counts:?}");
     let now = worker.snapshot().expect("there was one").now;
     assert!(counts.iter().all(|count| *count <= now.samples), "nothing of it is lost");
     // The next moments of the same scene have their kernels.
