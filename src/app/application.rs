@@ -206,7 +206,7 @@ impl App {
                 is_denoised: document.look.denoise,
                 hides_clock: self.is_repeatable,
             };
-            panels::status::show(ui, &status);
+            panels::status::show(ui, &status, commands);
             self.sides(ui, commands);
             self.dock(ui, commands);
         }

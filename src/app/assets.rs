@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::document::{Document, Viewpoint};
-use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
+use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader, Loading};
 use super::reload::Reload;
 use super::worker::Reference;
 use crate::environment::Environment;
@@ -70,8 +70,13 @@ impl Assets {
     }
 
     /// What is being loaded.
-    pub(super) fn loading(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn loading(&self) -> impl Iterator<Item = Loading<'_>> {
         self.loader.busy_with()
+    }
+
+    /// Gives up the scene or the map that is being loaded; whether there was one.
+    pub(super) fn stop_loading(&mut self, kind: Kind) -> bool {
+        self.loader.stop(kind)
     }
 
     /// What has been loaded since this was asked last and is still wanted.
@@ -109,7 +114,7 @@ impl Assets {
     /// What another program has written anew, once what was read before is there; nothing unless it is `wanted`.
     pub(super) fn changed(&self, document: &Document, wanted: bool) -> Vec<Kind> {
         let Some(reload) = self.reload.as_ref().filter(|_| wanted) else { return Vec::new() };
-        let is_there = |name: &str| self.loading().all(|busy| busy != name);
+        let is_there = |name: &str| self.loading().all(|busy| busy.name != name);
         let kinds = [(Kind::Scene, &document.scene), (Kind::Map, &document.map)];
         let changed = |(kind, name): &(Kind, &String)| is_there(name) && reload.takes(*kind);
         kinds.into_iter().filter(changed).map(|(kind, _)| kind).collect()

@@ -17,6 +17,8 @@ pub enum Command {
     OpenMap(String),
     /// Read the files of scene and map again: another program may have written them.
     ReadAgain,
+    /// Give up what is being loaded.
+    StopLoading,
     /// Read scene and map again when another program has written them, or no longer.
     ToggleReloads,
     /// Ask for a path.

@@ -44,6 +44,7 @@ impl App {
                 interface.paused = false;
                 document.map = name;
             }
+            Command::StopLoading => self.stop_loading(),
             Command::ReadAgain => {
                 let mut read = |kind| self.assets.read_again(kind, document);
                 interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
 use super::document::Document;
@@ -100,9 +100,11 @@ pub struct LoadedMap {
 
 impl LoadedMap {
     /// Reads a map.
-    fn read(name: &str, sun_factor: f32) -> Result<Self> {
+    fn read(name: &str, sun_factor: f32, steps: &Steps) -> Result<Self> {
+        steps.begin("reading")?;
         let start = Instant::now();
         let (map, notices) = sources::map(name)?;
+        steps.begin("building the table")?;
         let seconds = start.elapsed().as_secs_f64();
         let sun_texels = Arc::new(SunTexels::of(&map));
         Self::new(name, map, sun_texels, sun_factor, notices, seconds)
@@ -173,6 +175,34 @@ struct InFlight {
     /// Whether the scene is there and only its materials change, or the map and only its sun.
     is_edit: bool,
     number: u64,
+    began: Instant,
+    /// What its thread is doing.
+    step: Arc<Mutex<&'static str>>,
+}
+
+/// How a thread says what it is doing, and learns whether anybody still wants it.
+struct Steps(Weak<Mutex<&'static str>>);
+
+impl Steps {
+    /// Begins a step.
+    ///
+    /// # Errors
+    /// If nobody waits for the result any more.
+    fn begin(&self, step: &'static str) -> Result<()> {
+        let wanted = self.0.upgrade().ok_or_else(|| Error::new("nobody waits for it any more"))?;
+        *lock(&wanted) = step;
+        Ok(())
+    }
+}
+
+/// A file that is being read.
+pub struct Loading<'a> {
+    /// What was asked for.
+    pub name: &'a str,
+    /// What is done now, in a word or two.
+    pub step: &'static str,
+    /// Since it was asked for.
+    pub seconds: f64,
 }
 
 /// Loads one scene and one map at a time; results are collected with [`Loader::take`].
@@ -205,14 +235,16 @@ impl Loader {
     /// Starts to load a scene unless it is being loaded; a change to its materials is given up.
     pub fn load_scene(&mut self, name: &str) {
         let (own, options) = (name.to_owned(), self.options.clone());
-        self.spawn(Kind::Scene, name, false, move || Loaded::Scene(load_scene(&own, &options)));
+        self.spawn(Kind::Scene, name, false, move |steps| {
+            Loaded::Scene(load_scene(&own, &options, steps))
+        });
     }
 
     /// Starts to change the materials and lights of a scene that is there to what the document wants, unless something
     /// is being done to it.
     pub fn edit_scene(&mut self, scene: &LoadedScene, document: &Document) {
         let (own, edits, lamps) = (scene.clone(), document.materials.clone(), document.lamps);
-        self.spawn(Kind::Scene, &scene.name, true, move || {
+        self.spawn(Kind::Scene, &scene.name, true, move |_| {
             Loaded::Edited(own.edited(edits, lamps))
         });
     }
@@ -220,18 +252,29 @@ impl Loader {
     /// Starts to load a map unless it is being loaded; a change to its sun is given up.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
         let own = name.to_owned();
-        self.spawn(Kind::Map, name, false, move || Loaded::Map(LoadedMap::read(&own, sun_factor)));
+        self.spawn(Kind::Map, name, false, move |steps| {
+            Loaded::Map(LoadedMap::read(&own, sun_factor, steps))
+        });
     }
 
     /// Starts to change the sun of a map that is there, unless something is being done to it.
     pub fn edit_map(&mut self, map: &LoadedMap, sun_factor: f32) {
         let own = map.clone();
-        self.spawn(Kind::Map, &map.name, true, move || Loaded::Map(own.with_sun(sun_factor)));
+        self.spawn(Kind::Map, &map.name, true, move |_| Loaded::Map(own.with_sun(sun_factor)));
     }
 
     /// What is being loaded.
-    pub fn busy_with(&self) -> impl Iterator<Item = &str> {
-        self.in_flight.iter().flatten().map(|in_flight| in_flight.name.as_str())
+    pub fn busy_with(&self) -> impl Iterator<Item = Loading<'_>> {
+        self.in_flight.iter().flatten().map(|InFlight { name, began, step, .. }| Loading {
+            name,
+            step: *lock(step),
+            seconds: began.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Gives up the scene or the map that is being loaded; whether there was one. Its thread ends with its step.
+    pub(crate) fn stop(&mut self, kind: Kind) -> bool {
+        self.in_flight[kind as usize].take().is_some()
     }
 
     /// What has been loaded since the last call, by name; results nobody waits for any more are dropped.
@@ -250,7 +293,7 @@ impl Loader {
         kind: Kind,
         name: &str,
         is_edit: bool,
-        load: impl FnOnce() -> Loaded + Send + 'static,
+        load: impl FnOnce(&Steps) -> Loaded + Send + 'static,
     ) {
         let in_flight = &mut self.in_flight[kind as usize];
         if in_flight.as_ref().is_some_and(|it| it.name == name && (is_edit || !it.is_edit)) {
@@ -258,7 +301,9 @@ impl Loader {
         }
         self.begun += 1;
         let number = self.begun;
-        *in_flight = Some(InFlight { name: name.to_owned(), is_edit, number });
+        let (began, step) = (Instant::now(), Arc::new(Mutex::new("waiting")));
+        let steps = Steps(Arc::downgrade(&step));
+        *in_flight = Some(InFlight { name: name.to_owned(), is_edit, number, began, step });
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let turn = Arc::clone(&self.turns[kind as usize]);
         let name = name.to_owned();
@@ -266,7 +311,7 @@ impl Loader {
             let _turn = lock(&turn);
             // A panic must not leave the window waiting for ever.
             let failed = || Error::at(&name, "cannot be read: the program failed at it");
-            let loaded = catch_panic(load).unwrap_or_else(|| match kind {
+            let loaded = catch_panic(|| load(&steps)).unwrap_or_else(|| match kind {
                 Kind::Scene => Loaded::Scene(Err(failed())),
                 Kind::Map => Loaded::Map(Err(failed())),
             });
@@ -280,9 +325,11 @@ impl Loader {
     }
 }
 
-fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
+fn load_scene(name: &str, options: &SceneOptions, steps: &Steps) -> Result<LoadedScene> {
+    steps.begin("reading")?;
     let start = Instant::now();
     let scene = sources::scene_with(name, options)?;
+    steps.begin("building the tree")?;
     let read = start.elapsed().as_secs_f64();
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];

@@ -105,9 +105,24 @@ impl App {
             Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
             None => self.messages.error(error.to_string()),
         }
+        self.keep_scene("its scene cannot be read");
+    }
+
+    /// Gives up what is being loaded: what is shown stays.
+    pub(super) fn stop_loading(&mut self) {
+        if self.assets.stop_loading(Kind::Scene) {
+            self.keep_scene("its scene is not read");
+        }
+        if self.assets.stop_loading(Kind::Map) {
+            self.keep_map();
+        }
+    }
+
+    /// The scene that is shown stays, for this reason.
+    fn keep_scene(&mut self, why: &str) {
         // One that is read again is still shown.
         if self.assets.scene_of(&self.edited.document).is_none() {
-            self.messages.errors(self.saves.give_up("its scene cannot be read"));
+            self.messages.errors(self.saves.give_up(why));
         }
         stay_in_scene(&mut self.edited, &self.assets, &self.library);
     }
@@ -131,18 +146,21 @@ impl App {
 
     /// What is shown stays, and the document says so again.
     fn refuse_map(&mut self, error: &Error) {
-        let (map, sun) = match &self.assets.map {
-            Some(map) => {
-                self.messages.not_opened(Kind::Map, error.to_string());
-                (map.name.clone(), map.sun_factor)
-            }
-            // At the start there is none: the built-in one is always there.
-            None => {
-                self.messages.error(error.to_string());
-                let Document { map, sun, .. } = Document::default();
-                (map, sun)
-            }
-        };
+        match &self.assets.map {
+            Some(_) => self.messages.not_opened(Kind::Map, error.to_string()),
+            None => self.messages.error(error.to_string()),
+        }
+        self.keep_map();
+    }
+
+    /// The map that is shown stays.
+    fn keep_map(&mut self) {
+        let shown = self.assets.map.as_ref().map(|map| (map.name.clone(), map.sun_factor));
+        // At the start there is none: the built-in one is always there.
+        let (map, sun) = shown.unwrap_or_else(|| {
+            let Document { map, sun, .. } = Document::default();
+            (map, sun)
+        });
         if self.rendering.snapshot.is_none() {
             self.messages.errors(self.saves.give_up("there is no picture"));
         }

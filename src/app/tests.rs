@@ -156,6 +156,23 @@ fn a_map_that_has_gone_is_no_step_to_go_back_to() {
 }
 
 #[test]
+fn what_is_being_loaded_can_be_given_up() {
+    let Some(mut studio) = studio("open") else { return };
+    until(&mut studio, |studio| studio.app.assets.are_named_by(&studio.app.edited.document));
+    let before = studio.app.edited.document.clone();
+    studio.asks(Command::OpenScene("exterior".into()));
+    studio.asks(Command::OpenMap("sky:night".into()));
+    studio.frame().expect("drawn");
+    let loading: Vec<&str> = studio.app.assets.loading().map(|loading| loading.name).collect();
+    assert_eq!(loading, ["exterior", "sky:night"]);
+    studio.asks(Command::StopLoading);
+    assert_eq!(studio.app.edited.document, before, "all is as it was");
+    studio.frame().expect("drawn");
+    assert!(studio.app.assets.loading().next().is_none());
+    assert!(studio.app.assets.are_named_by(&before), "what was shown is still there");
+}
+
+#[test]
 fn the_sun_is_changed_without_the_file_of_its_map() {
     let Some(mut studio) = studio("open") else { return };
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,7 +1,11 @@
 //! The line below: what is going on, in numbers.
 
+use std::time::Duration;
+
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
+use crate::app::commands::Command;
+use crate::app::loader::Loading;
 use crate::app::overlays::{Overlay, value_text};
 use crate::app::rendering::Rendering;
 use crate::app::theme;
@@ -14,7 +18,7 @@ pub(in crate::app) struct Status<'a> {
     /// That of the picture on the screen.
     pub(in crate::app) shown: Option<&'a Snapshot>,
     /// Files being loaded.
-    pub(in crate::app) loading: Vec<&'a str>,
+    pub(in crate::app) loading: Vec<Loading<'a>>,
     /// What is drawn over it.
     pub(in crate::app) overlay: Option<Overlay>,
     /// Pixels of the screen for one of the picture, where it is magnified.
@@ -40,8 +44,11 @@ const GRADES: [(&str, Color32, &str, [f32; 2]); 3] = [
     ("Draft", theme::SECOND, "Light and shadows may still change", [f32::INFINITY; 2]),
 ];
 
+/// Seconds after which it is told how loading goes on.
+const MIN_LOADING_SECONDS: f64 = 1.0;
+
 /// Draws the line.
-pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
+pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 5));
     Panel::bottom("status").frame(frame).show(ui, |ui| {
         ui.horizontal(|ui| {
@@ -60,7 +67,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.shrink_clip_rect(ui.max_rect());
-                    phase(ui, status);
+                    phase(ui, status, commands);
                     if let Some(snapshot) = &status.rendering.snapshot {
                         figures(ui, snapshot, status);
                     }
@@ -70,10 +77,18 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
     });
 }
 
-fn phase(ui: &mut Ui, status: &Status<'_>) {
-    if let Some(name) = status.loading.first() {
-        let text = format!("Loading {}…", theme::file_name(name));
-        ui.label(RichText::new(text).color(theme::ACCENT)).on_hover_text(*name);
+fn phase(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
+    if let Some(loading) = status.loading.first() {
+        let name = theme::file_name(loading.name);
+        let text = match loading.seconds < MIN_LOADING_SECONDS || status.hides_clock {
+            true => format!("Loading {name}…"),
+            false => format!("Loading {name}: {}, {:.0} s", loading.step, loading.seconds),
+        };
+        ui.label(RichText::new(text).color(theme::ACCENT)).on_hover_text(loading.name);
+        if ui.small_button("Cancel").on_hover_text("What is shown stays").clicked() {
+            commands.push(Command::StopLoading);
+        }
+        ui.ctx().request_repaint_after(Duration::from_secs(1));
         return;
     }
     if status.rendering.worker.is_preparing() {
