@@ -31,6 +31,27 @@
     )
 )]
 
+/// Declares a struct with the default of each field.
+macro_rules! with_defaults {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis struct $name:ident {
+            $($(#[$of_field:meta])* $visibility_of_field:vis $field:ident: $type:ty = $default:expr,)+
+        }
+    ) => {
+        $(#[$attribute])*
+        $visibility struct $name {
+            $($(#[$of_field])* $visibility_of_field $field: $type),+
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default),+ }
+            }
+        }
+    };
+}
+
 mod alarm;
 #[cfg(feature = "window")]
 pub mod app;

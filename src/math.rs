@@ -4,6 +4,7 @@
 //! The map's centre column looks along +X, `u = 0.25` along -Z, the seam is at -X, row 0 at +Y.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+use std::ops::Index;
 
 use glam::{Vec2, Vec3};
 
@@ -41,6 +42,14 @@ impl Frame {
     pub fn world_from_local(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
+}
+
+/// Corners of a box that is given by its lowest and its highest.
+pub(crate) fn box_corners<T: Copy, V: Copy + Index<usize, Output = T> + From<[T; 3]>>(
+    ends: [V; 2],
+) -> [V; 8] {
+    let corner = |bits: usize| [0, 1, 2].map(|axis| ends[bits >> axis & 1][axis]);
+    std::array::from_fn(|bits| corner(bits).into())
 }
 
 /// Lat-long coordinates in `[0,1)` x `[0,1]` of a direction of any length.

@@ -168,6 +168,7 @@ mod tests {
     use crate::develop::DevelopSettings;
     use crate::develop::tests::developer;
     use crate::image::{Image, Rgb8};
+    use crate::render::gpu::texture;
     use crate::tone::{ToneCurve, WhiteBalance};
 
     /// A black frame of 24 x 20 pixels with a shape drawn at 1.25 pixels a point.
@@ -177,16 +178,8 @@ mod tests {
         source: &Source,
         (rect, has_squares): (Rect, bool),
     ) -> Rgb8 {
-        let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width: 24, height: 20, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+        let target = texture(&gpu.device, None, [24, 20], format, usage);
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         let drawn = source.drawn(rect, has_squares);
         let screen = ScreenDescriptor { size_in_pixels: [24, 20], pixels_per_point: 1.25 };

@@ -21,8 +21,8 @@ pub(super) const METHOD: &str = "https://dl.acm.org/doi/10.1145/3214745.3214808"
 /// The file dialogues of the desktop.
 #[derive(Default)]
 pub(super) struct Desktop {
-    /// What a dialogue lies before.
-    window: Option<Arc<Window>>,
+    /// The window that dialogues lie before.
+    pub(super) window: Option<Arc<Window>>,
     open: Option<Dialogue>,
     /// So many were opened.
     opened: u32,
@@ -41,11 +41,6 @@ struct Dialogue {
 }
 
 impl Desktop {
-    /// Says in which window of the desktop all is drawn: dialogues lie before it.
-    pub(super) fn lie_in(&mut self, window: Arc<Window>) {
-        self.window = Some(window);
-    }
-
     /// Says that the window has lost the keyboard.
     pub(super) fn lose_focus(&mut self) {
         self.open.iter_mut().for_each(|dialogue| dialogue.is_seen = true);

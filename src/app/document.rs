@@ -13,77 +13,83 @@ use crate::render::{Crop, Sampling, Sharing, StopRule, View};
 use crate::scene::{Camera, Material, MaterialEdit, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
-/// Everything a person sets about the picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Document {
-    /// Scene file or built-in scene.
-    pub scene: String,
-    /// Map file or built-in sky.
-    pub map: String,
-    /// Turn of the map in degrees, `[0, 360]`.
-    pub rotation_degrees: f32,
-    /// Factor on the map's radiance.
-    pub intensity: f32,
-    /// Factor on the radiance of the map's sun alone.
-    pub sun: f32,
-    /// Factor on the scene's point, spot and directional lights.
-    pub lamps: f32,
-    /// What the camera sees of the map.
-    pub background: Background,
-    /// Fog in place of the scene's own; `None` keeps that.
-    pub fog: Option<Medium>,
-    /// Where from; `None` until the scene is loaded and says it.
-    pub viewpoint: Option<Viewpoint>,
+with_defaults! {
+    /// Everything a person sets about the picture.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct Document {
+        /// Scene file or built-in scene.
+        pub scene: String = builtin::DEFAULT_SCENE.to_owned(),
+        /// Map file or built-in sky.
+        pub map: String = "sky:day".to_owned(),
+        /// Turn of the map in degrees, `[0, 360]`.
+        pub rotation_degrees: f32 = 0.0,
+        /// Factor on the map's radiance.
+        pub intensity: f32 = 1.0,
+        /// Factor on the radiance of the map's sun alone.
+        pub sun: f32 = 1.0,
+        /// Factor on the scene's point, spot and directional lights.
+        pub lamps: f32 = 1.0,
+        /// What the camera sees of the map.
+        pub background: Background = Background::default(),
+        /// Fog in place of the scene's own; `None` keeps that.
+        pub fog: Option<Medium> = None,
+        /// Where from; `None` until the scene is loaded and says it.
+        pub viewpoint: Option<Viewpoint> = None,
+        /// How light is found.
+        pub light: Light = Light::default(),
+        /// How the picture is developed.
+        pub look: Look = Look::default(),
+        /// How large it is.
+        pub size: PictureSize = PictureSize::Viewport(1),
+        /// The part that is rendered: left, top, right, bottom as shares of the picture, which may have become narrower
+        /// than that; `None` is all.
+        pub region: Option<[f32; 4]> = None,
+        /// When it is done: by default where other renderers end, too, for nobody wants a fan all night.
+        pub stop: StopRule = StopRule { samples: Some(1024), ..StopRule::default() },
+        /// Kept viewpoints of this scene.
+        pub bookmarks: Vec<Viewpoint> = Vec::new(),
+        /// Changes to this scene's materials, by their number.
+        pub materials: BTreeMap<u32, MaterialEdit> = BTreeMap::new(),
+    }
+}
+
+with_defaults! {
     /// How light is found.
-    pub light: Light,
-    /// How the picture is developed.
-    pub look: Look,
-    /// How large it is.
-    pub size: PictureSize,
-    /// The part that is rendered: left, top, right, bottom as shares of the picture, which may have become narrower
-    /// than that; `None` is all.
-    pub region: Option<[f32; 4]>,
-    /// When it is done.
-    pub stop: StopRule,
-    /// Kept viewpoints of this scene.
-    pub bookmarks: Vec<Viewpoint>,
-    /// Changes to this scene's materials, by their number.
-    pub materials: BTreeMap<u32, MaterialEdit>,
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    pub struct Light {
+        /// Where the picture is rendered.
+        #[serde(default)]
+        pub device: DeviceChoice = DeviceChoice::Auto,
+        /// How the map is sampled.
+        pub sampling: Sampling = Sampling::Adaptive,
+        /// Whether the plain method runs beside it for comparison.
+        pub split: bool = false,
+        /// Vertices, on surfaces and in media, at which a path gathers light.
+        pub bounces: u32 = PathLimits::default().bounces,
+        /// Seed of the random numbers.
+        pub seed: u32 = 0,
+    }
 }
 
-/// How light is found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Light {
-    /// Where the picture is rendered.
-    #[serde(default)]
-    pub device: DeviceChoice,
-    /// How the map is sampled.
-    pub sampling: Sampling,
-    /// Whether the plain method runs beside it for comparison.
-    pub split: bool,
-    /// Vertices, on surfaces and in media, at which a path gathers light.
-    pub bounces: u32,
-    /// Seed of the random numbers.
-    pub seed: u32,
-}
-
-/// How linear radiance becomes a picture; nothing of it restarts rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Look {
-    /// Whether the exposure follows the picture; `exposure_ev` is added to it then.
-    pub auto_exposure: bool,
-    /// Stops.
-    pub exposure_ev: f32,
-    /// Tone curve.
-    pub curve: ToneCurve,
-    /// The light that looks white.
-    pub white_balance: WhiteBalance,
-    /// Whether noise is filtered out for display and 8-bit pictures.
-    pub denoise: bool,
-    /// What filters it out.
-    #[serde(default)]
-    pub denoiser: Denoiser,
+with_defaults! {
+    /// How linear radiance becomes a picture; nothing of it restarts rendering.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    pub struct Look {
+        /// Whether the exposure follows the picture; `exposure_ev` is added to it then.
+        pub auto_exposure: bool = true,
+        /// Stops.
+        pub exposure_ev: f32 = 0.0,
+        /// Tone curve.
+        pub curve: ToneCurve = ToneCurve::Agx,
+        /// The light that looks white.
+        pub white_balance: WhiteBalance = WhiteBalance::default(),
+        /// Whether noise is filtered out for display and 8-bit pictures.
+        pub denoise: bool = true,
+        /// What filters it out.
+        #[serde(default)]
+        pub denoiser: Denoiser = Denoiser::default(),
+    }
 }
 
 impl Look {
@@ -114,43 +120,6 @@ impl PictureSize {
 
 /// Paths to learn from before the first sample.
 const MAX_LEARNING_PATHS: u64 = 1 << 13;
-
-impl Default for Document {
-    fn default() -> Self {
-        Self {
-            scene: builtin::DEFAULT_SCENE.to_owned(),
-            map: "sky:day".to_owned(),
-            rotation_degrees: 0.0,
-            intensity: 1.0,
-            sun: 1.0,
-            lamps: 1.0,
-            background: Background::default(),
-            fog: None,
-            viewpoint: None,
-            light: Light {
-                device: DeviceChoice::Auto,
-                sampling: Sampling::Adaptive,
-                split: false,
-                bounces: PathLimits::default().bounces,
-                seed: 0,
-            },
-            look: Look {
-                auto_exposure: true,
-                exposure_ev: 0.0,
-                curve: ToneCurve::Agx,
-                white_balance: WhiteBalance::default(),
-                denoise: true,
-                denoiser: Denoiser::default(),
-            },
-            size: PictureSize::Viewport(1),
-            region: None,
-            // Where other renderers end, too: nobody wants a fan all night.
-            stop: StopRule { samples: Some(1024), ..StopRule::default() },
-            bookmarks: Vec::new(),
-            materials: BTreeMap::new(),
-        }
-    }
-}
 
 impl Document {
     /// Whether all numbers of it that no settings file has are in range: it may come from a file.

@@ -9,71 +9,73 @@ use super::overlays::Overlay;
 use super::zoom::Zoom;
 use crate::scene::MaterialEdit;
 
-/// State of the window that is not the picture's.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Interface {
-    /// Whether panels are shown.
-    pub panels: bool,
-    /// What the right panel shows.
-    pub tab: Tab,
-    /// What is open below the picture.
-    pub dock: Option<Dock>,
-    /// Whether the list of keys is open.
-    pub shortcuts: bool,
-    /// What is asked in a prompt.
-    pub prompt: Option<Prompt>,
-    /// What is drawn over the picture.
-    pub overlay: Option<Overlay>,
-    /// How much of the picture it covers, `[0,1]`.
-    pub overlay_opacity: f32,
-    /// What the map of tiles shows.
-    pub tiles: TileView,
-    /// The tile chosen on the map.
-    pub tile: Option<u32>,
-    /// Place of the picture under the pointer, both coordinates in `[0,1]`.
-    pub pointed: Option<Vec2>,
-    /// The same of the whole that the picture is a part of.
-    pub pointed_in_whole: Option<Vec2>,
-    /// Place the inspector stays at.
-    pub pinned: Option<Vec2>,
-    /// The material that is looked at.
-    pub material: Option<u32>,
-    /// Whether it was just clicked: its settings are to come into sight.
-    pub is_material_new: bool,
-    /// What a copied material looks like.
-    pub copied_material: Option<MaterialEdit>,
-    /// What of the history is compared.
-    pub compared: Chosen,
-    /// Pixels of the screen that the whole picture fills from left to right where it fits, once it was drawn.
-    pub fitting_pixels: Option<f32>,
-    /// How large the picture is shown.
-    pub zoom: Zoom,
-    /// Where the wipe is, `[0,1]` across the picture.
-    pub wipe: f32,
-    /// Whether what was learned is kept as it is.
-    pub is_frozen: bool,
-    /// What the next drag or click in the picture does, if it does not move the camera.
-    pub tool: Option<Tool>,
-    /// The drag over the picture under way.
-    pub drag: Option<Drag>,
-    /// That of the wipe.
-    pub wipe_drag: Option<Drag>,
-    /// That of the map.
-    pub map_drag: Option<Drag>,
-    /// Whether rendering is halted.
-    pub paused: bool,
-    /// Counts restarts by hand.
-    pub run: u32,
-    /// Size of the viewport in pixels, once it was drawn.
-    pub viewport_pixels: Option<[u32; 2]>,
-    /// Size of the window in pixels that this was for, and whether panels were shown.
-    pub viewport_of: Option<([u32; 2], bool)>,
-    /// Until when the camera counts as moving, in the window's seconds.
-    pub moving_until: f64,
-    /// Until when the map counts as turning.
-    pub turning_until: f64,
-    /// Keys held that fly the camera.
-    pub flying: Vec<egui::Key>,
+with_defaults! {
+    /// State of the window that is not the picture's.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct Interface {
+        /// Whether panels are shown.
+        pub panels: bool = true,
+        /// What the right panel shows.
+        pub tab: Tab = Tab::Picture,
+        /// What is open below the picture.
+        pub dock: Option<Dock> = None,
+        /// Whether the list of keys is open.
+        pub shortcuts: bool = false,
+        /// What is asked in a prompt.
+        pub prompt: Option<Prompt> = None,
+        /// What is drawn over the picture.
+        pub overlay: Option<Overlay> = None,
+        /// How much of the picture it covers, `[0,1]`.
+        pub overlay_opacity: f32 = 0.75,
+        /// What the map of tiles shows.
+        pub tiles: TileView = TileView::Energy,
+        /// The tile chosen on the map.
+        pub tile: Option<u32> = None,
+        /// Place of the picture under the pointer, both coordinates in `[0,1]`.
+        pub pointed: Option<Vec2> = None,
+        /// The same of the whole that the picture is a part of.
+        pub pointed_in_whole: Option<Vec2> = None,
+        /// Place the inspector stays at.
+        pub pinned: Option<Vec2> = None,
+        /// The material that is looked at.
+        pub material: Option<u32> = None,
+        /// Whether it was just clicked: its settings are to come into sight.
+        pub is_material_new: bool = false,
+        /// What a copied material looks like.
+        pub copied_material: Option<MaterialEdit> = None,
+        /// What of the history is compared.
+        pub compared: Chosen = Chosen::default(),
+        /// Pixels of the screen that the whole picture fills from left to right where it fits, once it was drawn.
+        pub fitting_pixels: Option<f32> = None,
+        /// How large the picture is shown.
+        pub zoom: Zoom = Zoom::default(),
+        /// Where the wipe is, `[0,1]` across the picture.
+        pub wipe: f32 = 0.5,
+        /// Whether what was learned is kept as it is.
+        pub is_frozen: bool = false,
+        /// What the next drag or click in the picture does, if it does not move the camera.
+        pub tool: Option<Tool> = None,
+        /// The drag over the picture under way.
+        pub drag: Option<Drag> = None,
+        /// That of the wipe.
+        pub wipe_drag: Option<Drag> = None,
+        /// That of the map.
+        pub map_drag: Option<Drag> = None,
+        /// Whether rendering is halted.
+        pub paused: bool = false,
+        /// Counts restarts by hand.
+        pub run: u32 = 0,
+        /// Size of the viewport in pixels, once it was drawn.
+        pub viewport_pixels: Option<[u32; 2]> = None,
+        /// Size of the window in pixels that this was for, and whether panels were shown.
+        pub viewport_of: Option<([u32; 2], bool)> = None,
+        /// Until when the camera counts as moving, in the window's seconds.
+        pub moving_until: f64 = f64::NEG_INFINITY,
+        /// Until when the map counts as turning.
+        pub turning_until: f64 = f64::NEG_INFINITY,
+        /// Keys held that fly the camera.
+        pub flying: Vec<egui::Key> = Vec::new(),
+    }
 }
 
 /// What a drag or a click in the picture is for.
@@ -216,44 +218,6 @@ impl Purpose {
     /// Whether they are written.
     pub fn is_output(self) -> bool {
         matches!(self, Self::Picture | Self::Distributions)
-    }
-}
-
-impl Default for Interface {
-    fn default() -> Self {
-        Self {
-            panels: true,
-            tab: Tab::Picture,
-            dock: None,
-            shortcuts: false,
-            prompt: None,
-            overlay: None,
-            overlay_opacity: 0.75,
-            tiles: TileView::Energy,
-            tile: None,
-            pointed: None,
-            pointed_in_whole: None,
-            pinned: None,
-            material: None,
-            is_material_new: false,
-            copied_material: None,
-            compared: Chosen::default(),
-            fitting_pixels: None,
-            zoom: Zoom::default(),
-            wipe: 0.5,
-            is_frozen: false,
-            tool: None,
-            drag: None,
-            wipe_drag: None,
-            map_drag: None,
-            paused: false,
-            run: 0,
-            viewport_pixels: None,
-            viewport_of: None,
-            moving_until: f64::NEG_INFINITY,
-            turning_until: f64::NEG_INFINITY,
-            flying: Vec::new(),
-        }
     }
 }
 

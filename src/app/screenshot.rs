@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use egui_wgpu::{Renderer, ScreenDescriptor};
-use wgpu::{Extent3d, TextureFormat, TextureUsages};
+use wgpu::{TextureFormat, TextureUsages};
 
 use super::application::{App, Start};
 use super::interface::Interface;
@@ -16,7 +16,7 @@ use super::theme;
 use super::threads::{Wake, Wakes};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
-use crate::render::gpu::{DeviceChoice, Gpu};
+use crate::render::gpu::{DeviceChoice, Gpu, texture};
 
 /// Frames drawn after everything is settled: layout and tooltips need a few.
 const SETTLING_FRAMES: u32 = 4;
@@ -234,17 +234,9 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn new(gpu: Gpu, (width, height): (u32, u32), copies: TextureCopies) -> Self {
-        let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("window"),
-            size: Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+    fn new(gpu: Gpu, size: (u32, u32), copies: TextureCopies) -> Self {
+        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
+        let target = texture(&gpu.device, Some("window"), size.into(), FORMAT, usage);
         let mut renderer = Renderer::new(&gpu.device, FORMAT, renderer_options());
         copies.upload(&gpu, &mut renderer);
         Self { gpu, renderer, target, copies }

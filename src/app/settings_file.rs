@@ -29,53 +29,35 @@ pub struct SceneViewpoints {
     pub viewpoints: Vec<Viewpoint>,
 }
 
-/// Kept settings; what a file does not say stays at its default.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Settings {
-    /// Scene files, latest first.
-    pub recent_scenes: Vec<String>,
-    /// Map files, latest first.
-    pub recent_maps: Vec<String>,
-    /// Kept viewpoints, by scene, that changed last first.
-    pub viewpoints: Vec<SceneViewpoints>,
-    /// Where pictures were written last.
-    pub save_folder: Option<PathBuf>,
-    /// Size of the window in points.
-    pub window_size: [f32; 2],
-    /// How the picture is developed.
-    pub look: Look,
-    /// How light is found.
-    pub light: Light,
-    /// Size of the picture.
-    pub size: PictureSize,
-    /// When to stop.
-    pub stop: StopRule,
-    /// Whether scene and map are read again when another program has written them.
-    pub reloads: bool,
-    /// What the right panel shows.
-    pub tab: Tab,
-    /// What is open below the picture.
-    pub dock: Option<Dock>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        let document = Document::default();
-        Self {
-            recent_scenes: Vec::new(),
-            recent_maps: Vec::new(),
-            viewpoints: Vec::new(),
-            save_folder: None,
-            window_size: [1440.0, 900.0],
-            look: document.look,
-            light: document.light,
-            size: document.size,
-            stop: document.stop,
-            reloads: true,
-            tab: Tab::Picture,
-            dock: None,
-        }
+with_defaults! {
+    /// Kept settings; what a file does not say stays at its default.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct Settings {
+        /// Scene files, latest first.
+        pub recent_scenes: Vec<String> = Vec::new(),
+        /// Map files, latest first.
+        pub recent_maps: Vec<String> = Vec::new(),
+        /// Kept viewpoints, by scene, that changed last first.
+        pub viewpoints: Vec<SceneViewpoints> = Vec::new(),
+        /// Where pictures were written last.
+        pub save_folder: Option<PathBuf> = None,
+        /// Size of the window in points.
+        pub window_size: [f32; 2] = [1440.0, 900.0],
+        /// How the picture is developed.
+        pub look: Look = Look::default(),
+        /// How light is found.
+        pub light: Light = Light::default(),
+        /// Size of the picture.
+        pub size: PictureSize = Document::default().size,
+        /// When to stop.
+        pub stop: StopRule = Document::default().stop,
+        /// Whether scene and map are read again when another program has written them.
+        pub reloads: bool = true,
+        /// What the right panel shows.
+        pub tab: Tab = Tab::Picture,
+        /// What is open below the picture.
+        pub dock: Option<Dock> = None,
     }
 }
 

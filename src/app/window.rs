@@ -255,7 +255,7 @@ impl Runner {
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
         let mut app = App::new(start, loader, screen, &context, wakes)?;
-        app.desktop.lie_in(Arc::clone(&window));
+        app.desktop.window = Some(Arc::clone(&window));
         self.notices.drain(..).for_each(|sentence| app.messages.notice(sentence));
         Ok(Running {
             window,

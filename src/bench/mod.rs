@@ -57,7 +57,7 @@ pub fn run(
     for subject in subjects {
         let mut results = Vec::new();
         for (open, figures) in opened.iter().zip(&mut devices) {
-            if is_set(cancel) {
+            if cancel.load(Ordering::Relaxed) {
                 break;
             }
             let place = Place { subject, open, options, cancel };
@@ -71,10 +71,6 @@ pub fn run(
         }
     }
     Ok(Bench { machine, size: options.size, devices, parity })
-}
-
-fn is_set(cancel: &AtomicBool) -> bool {
-    cancel.load(Ordering::Relaxed)
 }
 
 /// Results that are compared between devices: a picture, and hits of rays.
@@ -218,7 +214,7 @@ fn slowest_stop(driver: &mut Driver<'_>) -> Result<f64> {
                 cancel.store(true, Ordering::Relaxed);
                 Instant::now()
             });
-            while !is_set(&cancel) {
+            while !cancel.load(Ordering::Relaxed) {
                 driver.advance(&cancel)?;
             }
             driver.session.settle()?;

@@ -12,6 +12,7 @@ use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use super::Ray;
 use super::lanes::Lanes;
 use super::wide::{Block, Node, Reference};
+use crate::math::box_corners;
 
 /// Meshes that are shown several times but held once, and where they are shown.
 #[derive(Debug, Clone, Copy, Default)]
@@ -115,9 +116,8 @@ impl Placed {
         for (lower, upper) in node.boxes() {
             let (lower, upper) = (lower.as_dvec3(), upper.as_dvec3());
             extent = extent.max(lower.abs()).max(upper.abs());
-            for corner in 0..8 {
-                let at = |axis: usize| if corner >> axis & 1 == 0 { lower } else { upper }[axis];
-                let corner = exact.transform_point3(DVec3::new(at(0), at(1), at(2)));
+            for corner in box_corners([lower, upper]) {
+                let corner = exact.transform_point3(corner);
                 (low, high) = (low.min(corner), high.max(corner));
             }
         }

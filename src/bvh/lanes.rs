@@ -35,6 +35,18 @@ impl Portable {
     }
 }
 
+/// Makes operations of what they do with two numbers.
+macro_rules! by_lane {
+    ($($name:ident -> $result:ty = $for_all:ident($operation:expr);)+) => {
+        $(
+            #[inline(always)]
+            fn $name(self, other: Self) -> $result {
+                self.$for_all(other, $operation)
+            }
+        )+
+    };
+}
+
 impl Lanes for Portable {
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -49,40 +61,18 @@ impl Lanes for Portable {
         self.0
     }
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
-    }
-    #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         self.mul(factor).add(term)
     }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> u32 {
-        self.mask(other, |a, b| a <= b)
-    }
-    #[inline(always)]
-    fn eq(self, other: Self) -> u32 {
-        self.mask(other, |a, b| a == b)
+    by_lane! {
+        add -> Self = zip(|a, b| a + b);
+        sub -> Self = zip(|a, b| a - b);
+        mul -> Self = zip(|a, b| a * b);
+        div -> Self = zip(|a, b| a / b);
+        min -> Self = zip(|a, b| if a < b { a } else { b });
+        max -> Self = zip(|a, b| if a > b { a } else { b });
+        le -> u32 = mask(|a, b| a <= b);
+        eq -> u32 = mask(|a, b| a == b);
     }
 }
 

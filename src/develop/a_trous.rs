@@ -38,14 +38,11 @@ const GUIDE_BYTES: u64 = 48;
 /// Bytes of a pixel's light.
 const LIGHT_BYTES: u64 = 16;
 
-pub(super) struct Passes {
-    undress: wgpu::ComputePipeline,
-    survey: wgpu::ComputePipeline,
-    share_errors: wgpu::ComputePipeline,
-    smooth_light: wgpu::ComputePipeline,
-    mend: wgpu::ComputePipeline,
-    dress: wgpu::ComputePipeline,
-}
+/// Entry points of the shader, in the order in which they run.
+const NAMES: [&str; 6] = ["undress", "survey", "share_errors", "smooth_light", "mend", "dress"];
+
+/// A pipeline for each of [`NAMES`].
+pub(super) struct Passes([wgpu::ComputePipeline; NAMES.len()]);
 
 impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Self {
@@ -55,14 +52,7 @@ impl Passes {
                 (shared() + include_str!("../../shaders/a_trous.wgsl")).into(),
             ),
         });
-        Self {
-            undress: pipeline(gpu, &shader, "undress"),
-            survey: pipeline(gpu, &shader, "survey"),
-            share_errors: pipeline(gpu, &shader, "share_errors"),
-            smooth_light: pipeline(gpu, &shader, "smooth_light"),
-            mend: pipeline(gpu, &shader, "mend"),
-            dress: pipeline(gpu, &shader, "dress"),
-        }
+        Self(NAMES.map(|name| pipeline(gpu, &shader, name)))
     }
 
     /// Whether the guides of so many pixels fit into one binding.
@@ -78,6 +68,7 @@ impl Passes {
         if !self.fits(gpu, film.width, film.height) {
             return None;
         }
+        let Self([undress, survey, share_errors, smooth_light, mend, dress]) = self;
         let size = [film.width, film.height];
         // The film's own counts may have gone on when the result is looked at.
         let planes = [
@@ -106,21 +97,21 @@ impl Passes {
             entry(4, &guides),
             entry(5, &light),
         ];
-        dispatch(gpu, &mut commands, &self.undress, &entries, size);
+        dispatch(gpu, &mut commands, undress, &entries, size);
         let entries = [entry(0, &one), entry(2, &film.counts), entry(4, &guides)];
-        dispatch(gpu, &mut commands, &self.survey, &entries, size);
+        dispatch(gpu, &mut commands, survey, &entries, size);
         let mut pass = |pipeline, settings: &wgpu::Buffer, more: &[wgpu::BindGroupEntry<'_>]| {
             let always =
                 [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];
             dispatch(gpu, &mut commands, pipeline, &[&always, more].concat(), size);
             std::mem::swap(&mut light, &mut result);
         };
-        pass(&self.share_errors, &one, &[entry(2, &film.counts)]);
+        pass(share_errors, &one, &[entry(2, &film.counts)]);
         for step in STEPS {
-            pass(&self.smooth_light, &settings(step), &[]);
+            pass(smooth_light, &settings(step), &[]);
         }
-        pass(&self.mend, &one, &[]);
-        pass(&self.dress, &one, &[entry(2, &film.counts), entry(7, &counts)]);
+        pass(mend, &one, &[]);
+        pass(dress, &one, &[entry(2, &film.counts), entry(7, &counts)]);
         gpu.submit([commands.finish()]);
         let [width, height] = size;
         Some(DeviceFilm { sum: light, counts, surfaces: None, width, height, scale: 1.0 })

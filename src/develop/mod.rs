@@ -15,11 +15,13 @@ use glam::Mat3;
 
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
-use crate::render::gpu::{DeviceFilm, Gpu, buffer};
+use crate::render::gpu::{DeviceFilm, Gpu, buffer, texture};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
 
 /// Pixels across of the picture that the exposure is taken from: so coarse that noise averages out.
 const EXPOSURE_WIDTH: u32 = 64;
+/// Texels of overlays and of developed pictures.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Pixels along a side of a workgroup's tile, as in the shaders.
 const TILE: u32 = 8;
 
@@ -144,7 +146,7 @@ impl Developer {
             label: Some("develop"),
             source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/develop.wgsl").into()),
         });
-        let no_overlay = upload::texture(gpu, [1, 1], &[[0; 4]]);
+        let no_overlay = upload::overlay(gpu, [1, 1], &[[0; 4]]);
         let developer = Self {
             develop: pipeline(gpu, &shader, "develop"),
             shrink: pipeline(gpu, &shader, "shrink"),
@@ -215,19 +217,11 @@ impl Developer {
     }
 
     /// A texture to develop pictures of this size into.
-    pub(crate) fn display_texture(&self, [width, height]: [u32; 2]) -> DisplayTexture {
-        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("developed picture"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8Unorm,
-            usage: wgpu::TextureUsages::STORAGE_BINDING
-                | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+    pub(crate) fn display_texture(&self, size: [u32; 2]) -> DisplayTexture {
+        let usage = wgpu::TextureUsages::STORAGE_BINDING
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC;
+        let texture = texture(&self.gpu.device, Some("developed picture"), size, FORMAT, usage);
         let view = texture.create_view(&Default::default());
         DisplayTexture { texture, view }
     }

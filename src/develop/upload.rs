@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{Developer, LinearPicture, OverlayTexture, filled};
+use super::{Developer, FORMAT, LinearPicture, OverlayTexture, filled};
 use crate::image::Image;
 use crate::render::film::{Film, Surface};
-use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::gpu::{DeviceFilm, Gpu, texture};
 
 /// Bytes of a pixel's sums, and of its counts.
 const PIXEL_BYTES: u64 = 16;
@@ -75,7 +75,7 @@ impl Developer {
             })
             .map(Option::unwrap_or_default)
             .collect();
-        texture(&self.gpu, picture.size(), &texels)
+        overlay(&self.gpu, picture.size(), &texels)
     }
 
     /// Whether a picture of this size fits on the device.
@@ -105,23 +105,15 @@ impl Developer {
     }
 }
 
-pub(super) fn texture(gpu: &Gpu, [width, height]: [u32; 2], texels: &[[u8; 4]]) -> OverlayTexture {
-    let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("overlay"),
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8Unorm,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
+pub(super) fn overlay(gpu: &Gpu, size: [u32; 2], texels: &[[u8; 4]]) -> OverlayTexture {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let texture = texture(&gpu.device, Some("overlay"), size, FORMAT, usage);
     let layout = wgpu::TexelCopyBufferLayout {
         offset: 0,
-        bytes_per_row: Some(4 * width),
+        bytes_per_row: Some(4 * size[0]),
         rows_per_image: None,
     };
-    gpu.queue.write_texture(texture.as_image_copy(), bytemuck::cast_slice(texels), layout, size);
+    let (place, texels) = (texture.as_image_copy(), bytemuck::cast_slice(texels));
+    gpu.queue.write_texture(place, texels, layout, texture.size());
     OverlayTexture(texture.create_view(&Default::default()))
 }

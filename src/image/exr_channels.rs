@@ -10,11 +10,7 @@ use crate::error::{Decoded, Notices};
 pub(crate) enum Channels {
     Rgb([usize; 3]),
     /// Luminance with the colour differences `(R-Y)/Y` and `(B-Y)/Y`.
-    LumaChroma {
-        y: usize,
-        ry: usize,
-        by: usize,
-    },
+    LumaChroma([usize; 3]),
     Grey(usize),
 }
 
@@ -22,8 +18,7 @@ impl Channels {
     /// The indices in use; a grey channel counts once.
     pub(crate) fn indices(self) -> Vec<usize> {
         match self {
-            Self::Rgb(rgb) => rgb.to_vec(),
-            Self::LumaChroma { y, ry, by } => vec![y, ry, by],
+            Self::Rgb(indices) | Self::LumaChroma(indices) => indices.to_vec(),
             Self::Grey(index) => vec![index],
         }
     }
@@ -108,7 +103,7 @@ fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Candidate> {
             push(rank, Channels::Rgb([r, g, b]));
         } else if let (Some(y), None, None) = (index(&["y"]), index(&["x"]), index(&["z"])) {
             match (index(&["ry"]), index(&["by"])) {
-                (Some(ry), Some(by)) => push(4, Channels::LumaChroma { y, ry, by }),
+                (Some(ry), Some(by)) => push(4, Channels::LumaChroma([y, ry, by])),
                 _ => push(5, Channels::Grey(y)),
             }
         }

@@ -470,7 +470,7 @@ impl BlockDecoder {
         match self.channels {
             Channels::Rgb(_) => {}
             Channels::Grey(_) => pixels.iter_mut().for_each(|p| *p = [p[0]; 3]),
-            Channels::LumaChroma { .. } => {
+            Channels::LumaChroma(_) => {
                 pixels.iter_mut().for_each(|p| *p = rgb_from_ycc(*p, self.weights));
             }
         }

@@ -1,5 +1,7 @@
 //! What a picture is, and how large it may be.
 
+use std::ops::Range;
+
 use crate::error::Decoded;
 use crate::memory;
 
@@ -46,15 +48,18 @@ impl Image {
             edge(i)..edge(i + 1).max(edge(i) + 1)
         };
         Self::from_fn(width, height, |x, y| {
-            let columns = covered(x, width, self.width);
-            let rows = covered(y, height, self.height);
-            let count = (columns.len() * rows.len()) as f64;
-            let mut sum = [0.0_f64; 3];
-            for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
-                sum.iter_mut().zip(self.at(x, y)).for_each(|(s, v)| *s += f64::from(v));
-            }
-            sum.map(|s| (s / count) as f32)
+            self.mean(covered(x, width, self.width), covered(y, height, self.height))
         })
+    }
+
+    /// The mean of a rectangle of pixels.
+    pub(crate) fn mean(&self, columns: Range<u32>, rows: Range<u32>) -> [f32; 3] {
+        let count = (columns.len() * rows.len()) as f64;
+        let mut sum = [0.0_f64; 3];
+        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+            sum.iter_mut().zip(self.at(x, y)).for_each(|(s, v)| *s += f64::from(v));
+        }
+        sum.map(|s| (s / count) as f32)
     }
 
     /// The picture in smaller pixels, `times` of which are as wide as one of its own, cut to a size.

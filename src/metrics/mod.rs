@@ -97,15 +97,7 @@ pub(crate) fn block_means(image: &Image) -> Image {
     let (width, height) = (image.width.div_ceil(BLOCK), image.height.div_ceil(BLOCK));
     let mean = |block: u32| {
         let (x, y) = (block % width * BLOCK, block / width * BLOCK);
-        let rows = y..(y + BLOCK).min(image.height);
-        let columns = x..(x + BLOCK).min(image.width);
-        let count = (rows.len() * columns.len()) as f64;
-        let mut sum = [0.0; 3];
-        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
-            let pixel = image.pixels[(y * image.width + x) as usize];
-            sum.iter_mut().zip(pixel).for_each(|(sum, p)| *sum += f64::from(p));
-        }
-        sum.map(|sum| (sum / count) as f32)
+        image.mean(x..(x + BLOCK).min(image.width), y..(y + BLOCK).min(image.height))
     };
     Image { width, height, pixels: (0..width * height).map(mean).collect() }
 }

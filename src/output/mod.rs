@@ -84,34 +84,22 @@ impl<'a> From<&'a Film> for Films<'a> {
     }
 }
 
-/// How a picture is written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PictureOptions {
-    /// Exposure of `.png` pictures.
-    pub exposure: Exposure,
-    /// Tone curve of `.png` pictures.
-    pub tone_curve: ToneCurve,
-    /// What takes the noise out of `.png` pictures, of [`LayerName::Denoised`] and of [`LinearRgb::Denoised`].
-    pub denoiser: Option<Denoiser>,
-    /// RGB of `.exr` pictures.
-    pub rgb: LinearRgb,
-    /// White balance of `.png` pictures.
-    pub white_balance: WhiteBalance,
-    /// Extra layers of `.exr` pictures.
-    pub layers: Vec<LayerName>,
-}
-
-impl Default for PictureOptions {
-    /// As `lightgrid render` does where nothing else is asked for.
-    fn default() -> Self {
-        Self {
-            exposure: Exposure::Auto,
-            tone_curve: ToneCurve::default(),
-            denoiser: None,
-            rgb: LinearRgb::default(),
-            white_balance: WhiteBalance::default(),
-            layers: Vec::new(),
-        }
+with_defaults! {
+    /// How a picture is written: by default as `lightgrid render` does where nothing else is asked for.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct PictureOptions {
+        /// Exposure of `.png` pictures.
+        pub exposure: Exposure = Exposure::Auto,
+        /// Tone curve of `.png` pictures.
+        pub tone_curve: ToneCurve = ToneCurve::default(),
+        /// What takes the noise out of `.png` pictures, of [`LayerName::Denoised`] and of [`LinearRgb::Denoised`].
+        pub denoiser: Option<Denoiser> = None,
+        /// RGB of `.exr` pictures.
+        pub rgb: LinearRgb = LinearRgb::default(),
+        /// White balance of `.png` pictures.
+        pub white_balance: WhiteBalance = WhiteBalance::default(),
+        /// Extra layers of `.exr` pictures.
+        pub layers: Vec<LayerName> = Vec::new(),
     }
 }
 

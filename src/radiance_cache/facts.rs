@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::cells::{CacheCells, Cell};
+use super::cells::Cell;
 use super::{RadianceCache, SLOTS, WORDS};
 
 /// The cache, and the training of its cells.
@@ -11,8 +11,10 @@ pub struct CacheFacts {
     pub(super) cache: RadianceCache,
     /// Training of each slot; a parent's is that of all its cells.
     pub(super) training: Vec<Training>,
-    pub(super) cell_count: usize,
-    pub(super) paths: u64,
+    /// Number of trained cells.
+    pub cell_count: usize,
+    /// Number of estimates over all cells.
+    pub samples: u64,
 }
 
 /// Training of a cell.
@@ -45,7 +47,7 @@ pub struct KnownCell {
 impl CacheFacts {
     /// The cell of a surface with this unit normal on the side it is seen from.
     pub fn cell_at(&self, position: Vec3, normal: Vec3) -> KnownCell {
-        let cells = self.cells();
+        let cells = self.cache.cells();
         let cell = cells.cell_at(position, normal);
         let [own, around] = [cell, cell.parent()].map(|cell| self.training_of(cell));
         let albedo = if own.paths > 0 { own.albedo } else { around.albedo };
@@ -58,21 +60,6 @@ impl CacheFacts {
             samples_around: around.paths,
             radiance: albedo * self.cache.radiance_over_albedo(position, normal),
         }
-    }
-
-    /// The division of surfaces into cells.
-    pub fn cells(&self) -> &CacheCells {
-        self.cache.cells()
-    }
-
-    /// Number of trained cells.
-    pub fn cell_count(&self) -> usize {
-        self.cell_count
-    }
-
-    /// Number of estimates over all cells.
-    pub fn samples(&self) -> u64 {
-        self.paths
     }
 
     /// Bytes of the cache and its training, without these facts.
@@ -89,7 +76,7 @@ impl CacheFacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::radiance_cache::RadianceSums;
+    use crate::radiance_cache::{CacheCells, RadianceSums};
 
     #[test]
     fn a_cell_tells_what_has_trained_it() {
@@ -102,7 +89,7 @@ mod tests {
             sums.add(here, Vec3::Y, radiance, Vec3::new(0.5, 0.5, 0.25));
         }
         let facts = sums.facts().expect("something is known");
-        assert_eq!((facts.cell_count(), facts.samples()), (1, 1000));
+        assert_eq!((facts.cell_count, facts.samples), (1, 1000));
         let cell = facts.cell_at(here, Vec3::Y);
         assert_eq!((cell.level, cell.face, cell.edge), (0, 2, 0.1));
         assert_eq!((cell.samples, cell.samples_around), (1000, 1000));

@@ -140,7 +140,7 @@ impl RadianceSums {
             cache: self.cache_of(&tallies, &all),
             training: training.collect(),
             cell_count: tallies.iter().filter(|tally| tally.parent.is_some()).count(),
-            paths: all.count,
+            samples: all.count,
         })
     }
 

@@ -14,6 +14,7 @@ use super::light::PunctualLight;
 use super::material::{Material, Texture, TextureImage};
 use super::medium::Medium;
 use crate::error::{Error, Notices, Result};
+use crate::math::box_corners;
 
 /// All that can be rendered, ready for a BVH: in world space, but for meshes that instances share.
 ///
@@ -134,20 +135,13 @@ impl Scene {
             .map(|mesh| {
                 let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
                 let points = mesh.flat_map(corners);
-                points.fold(None, |found: Option<(Vec3, Vec3)>, point| {
-                    let (low, high) = found.unwrap_or((point, point));
-                    Some((low.min(point), high.max(point)))
-                })
+                let ends = points.map(|point| [point, point]);
+                ends.reduce(|[low, high], [point, _]| [low.min(point), high.max(point)])
             })
             .collect();
         let of_instances = self.instances.iter().flat_map(move |instance| {
-            let around = boxes[instance.mesh as usize].into_iter();
-            around.flat_map(move |(low, high)| {
-                (0..8).map(move |corner| {
-                    let at = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
-                    instance.placing.position(Vec3::new(at(0), at(1), at(2)))
-                })
-            })
+            let corners = boxes[instance.mesh as usize].into_iter().flat_map(box_corners);
+            corners.map(|corner| instance.placing.position(corner))
         });
         let own = self.own_triangles().map(|place| place as usize);
         own.filter(is_wanted).flat_map(corners).chain(of_instances)

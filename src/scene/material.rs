@@ -75,123 +75,86 @@ const MAX_SMOOTH_ROUGHNESS: f32 = 0.03;
 /// Roughness from which none are.
 const MIN_ROUGHNESS: f32 = 0.035;
 
-/// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
-/// which most materials have few or none, are boxed: a file may have a million materials.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Material {
-    /// Name in the file, for messages and overlays.
-    pub name: String,
-    /// Base colour factor, linear RGB and alpha.
-    pub base_color: Vec4,
-    /// Metalness in `[0,1]`.
-    pub metallic: f32,
-    /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
-    pub roughness: f32,
-    /// Scale of the normal map's x and y; finite, of any sign, 1 is the map as it is.
-    pub normal_scale: f32,
-    /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
-    pub emissive: Vec3,
-    /// How alpha is used.
-    pub alpha_mode: AlphaMode,
-    /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
-    /// modelled single-sided does not leak light.
-    pub double_sided: bool,
-    /// Another single-sided surface lies in the same place and faces the other way: all rays pass this one
-    /// from behind.
-    pub backed: bool,
-    /// `KHR_materials_unlit`: base colour is emitted as it is, nothing is reflected.
-    pub unlit: bool,
-    /// `KHR_materials_ior`; 0 means infinitely high (F0 = 1), otherwise at least 1.
-    pub ior: f32,
-    /// `KHR_materials_specular` strength in `[0,1]`.
-    pub specular: f32,
-    /// F0 tint, linear.
-    pub specular_color: Vec3,
-    /// `KHR_materials_transmission` in `[0,1]`.
-    pub transmission: f32,
-    /// `KHR_materials_diffuse_transmission`: share in `[0,1]` of the body's light that comes through
-    /// instead of back.
-    pub diffuse_transmission: f32,
-    /// Colour of what comes through, linear, in `[0,1]`.
-    pub diffuse_transmission_color: Vec3,
-    /// `KHR_materials_volume` thickness in the mesh's units, not negative. Only whether it is 0 counts: 0 is a
-    /// thin wall, more is a solid body with an inside.
-    pub thickness: f32,
-    /// Colour that white light becomes after `attenuation_distance` inside the body, linear, in `[0,1]`.
-    pub attenuation_color: Vec3,
-    /// Metres, above 0; infinite is no absorption.
-    pub attenuation_distance: f32,
-    /// Scattering coefficient per metre inside the body, linear RGB, not negative.
-    pub scattering: Vec3,
-    /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`](crate::scene::Medium::anisotropy).
-    pub scatter_anisotropy: f32,
-    /// `KHR_materials_anisotropy` strength in `[0,1]`: how much wider reflections are along the
-    /// direction below than `roughness` says; 1 is as wide as roughness 1.
-    pub anisotropy: f32,
-    /// Direction of that width in radians from the tangent, counter-clockwise.
-    pub anisotropy_rotation: f32,
-    /// `KHR_materials_iridescence`: share in `[0,1]` of the surface that a thin film covers.
-    pub iridescence: f32,
-    /// Index of refraction of the film, at least 1.
-    pub iridescence_ior: f32,
-    /// Thickness of the film in nanometres where its texture is 0 and where it is 1; without a
-    /// texture it is the second.
-    pub iridescence_thickness: [f32; 2],
-    /// `KHR_materials_dispersion`: 20 over the Abbe number of a solid body, not negative; 0 bends all
-    /// colours alike.
-    pub dispersion: f32,
-    /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
-    pub sheen_color: Vec3,
-    /// Perceptual roughness of the sheen in `[0,1]`.
-    pub sheen_roughness: f32,
-    /// `KHR_materials_clearcoat` strength in `[0,1]`.
-    pub clearcoat: f32,
-    /// Perceptual roughness of the coat in `[0,1]`; GGX alpha is its square.
-    pub clearcoat_roughness: f32,
-    /// Scale of the coat normal map's x and y, as [`Self::normal_scale`].
-    pub clearcoat_normal_scale: f32,
-    /// Textures by [`TextureSlot`].
-    pub textures: [Option<Box<TextureRef>>; 17],
-}
-
-impl Default for Material {
-    /// glTF's default material: white, metallic 1, roughness 1 are its factor defaults.
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            base_color: Vec4::ONE,
-            metallic: 1.0,
-            roughness: 1.0,
-            normal_scale: 1.0,
-            emissive: Vec3::ZERO,
-            alpha_mode: AlphaMode::Opaque,
-            double_sided: false,
-            backed: false,
-            unlit: false,
-            ior: 1.5,
-            specular: 1.0,
-            specular_color: Vec3::ONE,
-            transmission: 0.0,
-            diffuse_transmission: 0.0,
-            diffuse_transmission_color: Vec3::ONE,
-            thickness: 0.0,
-            attenuation_color: Vec3::ONE,
-            attenuation_distance: f32::INFINITY,
-            scattering: Vec3::ZERO,
-            scatter_anisotropy: 0.0,
-            anisotropy: 0.0,
-            anisotropy_rotation: 0.0,
-            iridescence: 0.0,
-            iridescence_ior: 1.3,
-            iridescence_thickness: [100.0, 400.0],
-            dispersion: 0.0,
-            sheen_color: Vec3::ZERO,
-            sheen_roughness: 0.0,
-            clearcoat: 0.0,
-            clearcoat_roughness: 0.0,
-            clearcoat_normal_scale: 1.0,
-            textures: Default::default(),
-        }
+with_defaults! {
+    /// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
+    /// which most materials have few or none, are boxed: a file may have a million materials.
+    ///
+    /// The default is glTF's: white, metallic 1, roughness 1 are its factor defaults.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct Material {
+        /// Name in the file, for messages and overlays.
+        pub name: String = String::new(),
+        /// Base colour factor, linear RGB and alpha.
+        pub base_color: Vec4 = Vec4::ONE,
+        /// Metalness in `[0,1]`.
+        pub metallic: f32 = 1.0,
+        /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
+        pub roughness: f32 = 1.0,
+        /// Scale of the normal map's x and y; finite, of any sign, 1 is the map as it is.
+        pub normal_scale: f32 = 1.0,
+        /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
+        pub emissive: Vec3 = Vec3::ZERO,
+        /// How alpha is used.
+        pub alpha_mode: AlphaMode = AlphaMode::Opaque,
+        /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
+        /// modelled single-sided does not leak light.
+        pub double_sided: bool = false,
+        /// Another single-sided surface lies in the same place and faces the other way: all rays pass this one
+        /// from behind.
+        pub backed: bool = false,
+        /// `KHR_materials_unlit`: base colour is emitted as it is, nothing is reflected.
+        pub unlit: bool = false,
+        /// `KHR_materials_ior`; 0 means infinitely high (F0 = 1), otherwise at least 1.
+        pub ior: f32 = 1.5,
+        /// `KHR_materials_specular` strength in `[0,1]`.
+        pub specular: f32 = 1.0,
+        /// F0 tint, linear.
+        pub specular_color: Vec3 = Vec3::ONE,
+        /// `KHR_materials_transmission` in `[0,1]`.
+        pub transmission: f32 = 0.0,
+        /// `KHR_materials_diffuse_transmission`: share in `[0,1]` of the body's light that comes through
+        /// instead of back.
+        pub diffuse_transmission: f32 = 0.0,
+        /// Colour of what comes through, linear, in `[0,1]`.
+        pub diffuse_transmission_color: Vec3 = Vec3::ONE,
+        /// `KHR_materials_volume` thickness in the mesh's units, not negative. Only whether it is 0 counts: 0 is a
+        /// thin wall, more is a solid body with an inside.
+        pub thickness: f32 = 0.0,
+        /// Colour that white light becomes after `attenuation_distance` inside the body, linear, in `[0,1]`.
+        pub attenuation_color: Vec3 = Vec3::ONE,
+        /// Metres, above 0; infinite is no absorption.
+        pub attenuation_distance: f32 = f32::INFINITY,
+        /// Scattering coefficient per metre inside the body, linear RGB, not negative.
+        pub scattering: Vec3 = Vec3::ZERO,
+        /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`](crate::scene::Medium::anisotropy).
+        pub scatter_anisotropy: f32 = 0.0,
+        /// `KHR_materials_anisotropy` strength in `[0,1]`: how much wider reflections are along the
+        /// direction below than `roughness` says; 1 is as wide as roughness 1.
+        pub anisotropy: f32 = 0.0,
+        /// Direction of that width in radians from the tangent, counter-clockwise.
+        pub anisotropy_rotation: f32 = 0.0,
+        /// `KHR_materials_iridescence`: share in `[0,1]` of the surface that a thin film covers.
+        pub iridescence: f32 = 0.0,
+        /// Index of refraction of the film, at least 1.
+        pub iridescence_ior: f32 = 1.3,
+        /// Thickness of the film in nanometres where its texture is 0 and where it is 1; without a
+        /// texture it is the second.
+        pub iridescence_thickness: [f32; 2] = [100.0, 400.0],
+        /// `KHR_materials_dispersion`: 20 over the Abbe number of a solid body, not negative; 0 bends all
+        /// colours alike.
+        pub dispersion: f32 = 0.0,
+        /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
+        pub sheen_color: Vec3 = Vec3::ZERO,
+        /// Perceptual roughness of the sheen in `[0,1]`.
+        pub sheen_roughness: f32 = 0.0,
+        /// `KHR_materials_clearcoat` strength in `[0,1]`.
+        pub clearcoat: f32 = 0.0,
+        /// Perceptual roughness of the coat in `[0,1]`; GGX alpha is its square.
+        pub clearcoat_roughness: f32 = 0.0,
+        /// Scale of the coat normal map's x and y, as [`Self::normal_scale`].
+        pub clearcoat_normal_scale: f32 = 1.0,
+        /// Textures by [`TextureSlot`].
+        pub textures: [Option<Box<TextureRef>>; 17] = Default::default(),
     }
 }
 

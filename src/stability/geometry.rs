@@ -260,8 +260,9 @@ fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
         Ok(mean(&render(setting, (&builder.build(), &environment), view, 256)?))
     };
     let off = difference(of(1.0)?, of(scale)?);
-    let (world, camera) = sealed(scale);
-    let film = render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?;
+    let (builder, camera) = sealed(scale);
+    let film =
+        render(setting, (&builder.build(), &environment), view(camera, Sampling::Plain, 8), 64)?;
     Ok(Outcome::default()
         .sound(&film)
         .at_most("against the room of 4 m: standard errors off", off, SIGMAS)
@@ -275,10 +276,8 @@ fn small_beside_large(setting: &Setting) -> Result<Outcome> {
     let ground =
         |builder: WorldBuilder| builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
     let dark = {
-        let (builder, camera) = room(0.8, scale, Vec3::ZERO);
-        let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
-        let high = Vec3::new(2.0, 2.5, 1.5) * scale;
-        let world = ground(builder.faces(&lambert(0.8), low, high, [0])).build();
+        let (builder, camera) = sealed(scale);
+        let world = ground(builder).build();
         render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?
     };
     // The same scene at the room's usual size.

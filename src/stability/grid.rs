@@ -125,8 +125,8 @@ fn camera_inside(setting: &Setting) -> Result<Outcome> {
 }
 
 fn sealed_room(setting: &Setting) -> Result<Outcome> {
-    let (world, camera) = sealed(1.0);
-    black(setting, &world, &camera)
+    let (builder, camera) = sealed(1.0);
+    black(setting, &builder.build(), &camera)
 }
 
 fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {

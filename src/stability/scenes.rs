@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;
-use crate::path::{Lit, PathLimits, World, WorldBuilder};
+use crate::path::{Lit, PathLimits, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::UploadedScene;
@@ -70,11 +70,11 @@ pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (WorldBuilder, Came
 }
 
 /// The room without its window.
-pub(super) fn sealed(scale: f32) -> (World, Camera) {
+pub(super) fn sealed(scale: f32) -> (WorldBuilder, Camera) {
     let (builder, camera) = room(0.8, scale, Vec3::ZERO);
     let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
     let high = Vec3::new(2.0, 2.5, 1.5) * scale;
-    (builder.faces(&lambert(0.8), low, high, [0]).build(), camera)
+    (builder.faces(&lambert(0.8), low, high, [0]), camera)
 }
 
 /// A map of one radiance.

@@ -303,10 +303,7 @@ fn picture(ui: &mut Ui, snapshot: &Snapshot) {
     let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
     let map = snapshot.request.environment.memory_bytes();
     let [grid, table, pixels] = [grid, map.table, map.pixels].map(theme::bytes);
-    Grid::new("picture").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
-        let mut line = |name: &str, value: String, hint: &str| {
-            fact(ui, name, value).on_hover_text(hint);
-        };
+    in_rows(ui, "picture", |line| {
         line(
             "Noise",
             percent(session.noise as f32),
@@ -322,7 +319,11 @@ fn picture(ui: &mut Ui, snapshot: &Snapshot) {
             percent(snapshot.errors.map_or(0.0, |errors| errors.share())),
             "Its share of the picture: less noise and an error of its own, for which the share falls as samples arrive",
         );
-        line("Memory", grid.clone(), &format!("Light Grid {grid}, importance table {table}, map {pixels}"));
+        line(
+            "Memory",
+            grid.clone(),
+            &format!("Light Grid {grid}, importance table {table}, map {pixels}"),
+        );
     });
 }
 
@@ -340,10 +341,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         distribution => distribution.to_string(),
     };
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
-    Grid::new("cell").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
-        let mut line = |name: &str, value: String, hint: &str| {
-            fact(ui, name, value).on_hover_text(hint);
-        };
+    in_rows(ui, "cell", |line| {
         line(
             "Cell",
             cell,
@@ -354,13 +352,18 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
             distribution,
             "What the map is sampled by from here; a cell has its own once it has learned enough",
         );
-        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z), "World position; y is up");
+        line(
+            "Position",
+            format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z),
+            "World position; y is up",
+        );
         line("Material", inspected.material.clone(), "Its name in the file");
         if !inspected.probabilities.is_empty() {
             let p = &inspected.probabilities;
             let entropy: f32 = p.iter().map(|p| if *p > 0.0 { -p * p.log2() } else { 0.0 }).sum();
             let support = p.iter().filter(|p| **p > 0.0).count();
-            let hint = "Spread of the distribution: 0 bits is one tile, each bit doubles their number";
+            let hint =
+                "Spread of the distribution: 0 bits is one tile, each bit doubles their number";
             line("Entropy", format!("{entropy:.2} bits over {support} tiles"), hint);
         }
         if tries > 0.0 {
@@ -373,11 +376,17 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
     });
 }
 
-/// A row of a grid; both its words.
-fn fact(ui: &mut Ui, name: &str, value: String) -> Response {
-    let both = ui.label(theme::quiet(name)) | ui.label(RichText::new(value).size(12.5));
-    ui.end_row();
-    both
+/// Facts in rows: each by its name, with a hint if that is not empty.
+fn in_rows(ui: &mut Ui, id: &str, facts: impl FnOnce(&mut dyn FnMut(&str, String, &str))) {
+    Grid::new(id).num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
+        facts(&mut |name, value, hint| {
+            let both = ui.label(theme::quiet(name)) | ui.label(RichText::new(value).size(12.5));
+            if !hint.is_empty() {
+                both.on_hover_text(hint);
+            }
+            ui.end_row();
+        });
+    });
 }
 
 /// What the radiance cache knows there.
@@ -401,17 +410,12 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
         (0, 0) => "untrained: the global mean is used".to_owned(),
         (own, around) => format!("{} samples, {} around", theme::count(own), theme::count(around)),
     };
-    Grid::new("cached").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
-        let mut line = |name: &str, value: String| {
-            fact(ui, name, value);
-        };
-        line(
-            "Cache cell",
-            format!("level {}, edge {}, face {face}", cell.level, length(cell.edge)),
-        );
-        line("Trained by", trained);
-        line("Radiance", radiance);
-        line("Cache", overlay::cache_size(cache));
+    in_rows(ui, "cached", |line| {
+        let place = format!("level {}, edge {}, face {face}", cell.level, length(cell.edge));
+        line("Cache cell", place, "");
+        line("Trained by", trained, "");
+        line("Radiance", radiance, "");
+        line("Cache", overlay::cache_size(cache), "");
     });
 }
 

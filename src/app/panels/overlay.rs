@@ -62,7 +62,7 @@ pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
 
 /// How large the cache is.
 pub(in crate::app) fn cache_size(cache: &CacheFacts) -> String {
-    let [cells, samples] = [cache.cell_count() as u64, cache.samples()].map(theme::count);
+    let [cells, samples] = [cache.cell_count as u64, cache.samples].map(theme::count);
     let memory = theme::bytes(CacheFacts::memory_bytes()).replace(' ', "\u{a0}");
     format!("{cells} cells of {samples} samples, {memory}")
 }

@@ -97,14 +97,12 @@ impl Worker {
 
     /// Whether a picture is what was asked for last.
     pub(super) fn has_answered(&self, snapshot: &Snapshot) -> bool {
-        let latest = &self.shared.orders.slot().value;
-        latest.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
+        self.latest().is_some_and(|latest| snapshot.request.is_same(&latest))
     }
 
     /// Whether a picture is of what was asked for last, whatever else is wanted with it.
     pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
-        let latest = &self.shared.orders.slot().value;
-        latest.as_ref().is_some_and(|latest| !snapshot.request.restarts(latest))
+        self.latest().is_some_and(|latest| !snapshot.request.restarts(&latest))
     }
 
     /// Whether a GPU is being opened, filled or programmed.

@@ -354,17 +354,13 @@ impl RenderArguments {
             camera.clone()
         } else {
             let chosen = framing::frame(world, self.size.0 as f32 / self.size.1 as f32);
-            let eye = frame.point_in_file(chosen.world_from_camera.translation.into());
-            let target = frame.point_in_file(chosen.target());
+            let in_words =
+                |point| frame.point_in_file(point).to_array().map(|x| x.to_string()).join(",");
             notices.add(format!(
-                "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {}",
+                "{} has no camera; the view is --eye {} --target {} --fov {}",
                 self.scene,
-                eye.x,
-                eye.y,
-                eye.z,
-                target.x,
-                target.y,
-                target.z,
+                in_words(chosen.world_from_camera.translation.into()),
+                in_words(chosen.target()),
                 framing::FOV_Y_RADIANS.to_degrees(),
             ));
             chosen

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::buffer::buffer;
+use super::buffer::{buffer, texture};
 use super::device::Gpu;
 use super::shader::{ARRAYS, ArrayKind, ArrayPlaces, TexelFormat};
 use crate::error::{Error, Result};
@@ -309,20 +309,13 @@ fn create(device: &wgpu::Device, name: &str, bytes: u64) -> Buffer {
 }
 
 fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(kind.name),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: match kind.format {
-            TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
-            TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
-            TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
-            TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
-            TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
-        },
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    })
+    let format = match kind.format {
+        TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
+        TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
+        TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
+        TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
+        TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
+    };
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    texture(device, Some(kind.name), [width, height], format, usage)
 }

@@ -1,53 +1,61 @@
 //! The kernels.
 
-/// Entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Kernel {
+/// Declares the kernels, each with the name of its entry point, which is that of its file too.
+macro_rules! kernels {
+    ($($(#[$doc:meta])+ $kernel:ident = $name:literal)+) => {
+        /// Entry points.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub(crate) enum Kernel {
+            $($(#[$doc])+ $kernel),+
+        }
+
+        impl Kernel {
+            /// Number of kernels.
+            pub(crate) const COUNT: usize = [$($name),+].len();
+
+            /// Name of the entry point.
+            pub(crate) fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kernel => $name),+
+                }
+            }
+
+            /// The file with the entry point.
+            pub(super) fn source(self) -> &'static str {
+                match self {
+                    $(Self::$kernel => include_str!(concat!("../../../shaders/", $name, ".wgsl"))),+
+                }
+            }
+        }
+    };
+}
+
+kernels! {
     /// Adds samples to pixels.
-    Render,
+    Render = "render"
     /// Traces learning paths.
-    Learn,
+    Learn = "learn"
     /// Traces paths that train the radiance cache.
-    Train,
+    Train = "train"
     /// Finds the nearest hits of rays, for measurements.
-    ClosestHits,
+    ClosestHits = "closest_hits"
     /// Finds how much light comes along rays, for measurements.
-    ShadowRays,
+    ShadowRays = "shadow_rays"
     /// Adds samples to pixels, with the two that follow: finds what rays of paths hit.
-    Trace,
+    Trace = "trace"
     /// Finds what becomes of paths there.
-    Shade,
+    Shade = "shade"
     /// Follows their rays towards lights.
-    FollowShadows,
+    FollowShadows = "follow_shadows"
     /// Adds samples to pixels that share, with the two that follow: finds second vertices.
-    FindSeconds,
+    FindSeconds = "find_seconds"
     /// Estimates what arrives there.
-    LightSeconds,
+    LightSeconds = "light_seconds"
     /// Gathers light at the first vertices.
-    ConnectSeconds,
+    ConnectSeconds = "connect_seconds"
 }
 
 impl Kernel {
-    /// Name of the entry point.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Learn => "learn",
-            Self::Train => "train",
-            Self::ClosestHits => "closest_hits",
-            Self::ShadowRays => "shadow_rays",
-            Self::Trace => "trace",
-            Self::Shade => "shade",
-            Self::FollowShadows => "follow_shadows",
-            Self::FindSeconds => "find_seconds",
-            Self::LightSeconds => "light_seconds",
-            Self::ConnectSeconds => "connect_seconds",
-        }
-    }
-
-    /// Number of kernels.
-    pub(crate) const COUNT: usize = 11;
-
     /// Those that bring all paths one ray further, in order.
     pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
 

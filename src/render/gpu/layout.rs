@@ -396,12 +396,7 @@ fn texture_ref(scene: &Scene, first_texels: &[u32], reference: &scene::TextureRe
         width: if is_empty { 0 } else { image.width },
         height: image.height,
         flags,
-        matrix: Vec4::new(
-            transform.matrix2.x_axis.x,
-            transform.matrix2.x_axis.y,
-            transform.matrix2.y_axis.x,
-            transform.matrix2.y_axis.y,
-        ),
+        matrix: transform.matrix2.to_cols_array().into(),
         translation: transform.translation,
         padding: Vec2::ZERO,
     }

@@ -67,7 +67,7 @@ pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
     AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
-pub(crate) use buffer::buffer;
+pub(crate) use buffer::{buffer, texture};
 pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};

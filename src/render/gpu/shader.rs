@@ -212,49 +212,35 @@ impl Program {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
         };
-        let Constants {
-            stack_size,
-            shared_stack_size,
-            vertex,
-            textures_in_scene,
-            albedo_at,
-            sheen_at,
-            rescatter_at,
-            filter_at,
-            rows_at,
-            metres: _,
-            shared_tile,
-        } = *constants;
         declare(&[
-            ("STACK_SIZE", stack_size),
-            ("SHARED_STACK_SIZE", shared_stack_size),
-            ("VERTEX_TEXELS", vertex.count),
-            ("SECOND_UV_TEXEL", vertex.second_uv),
-            ("TANGENT_TEXEL", vertex.tangent),
-            ("COLOR_TEXEL", vertex.color),
-            ("TEXTURES_IN_SCENE", textures_in_scene),
-            ("ALBEDO_AT", albedo_at),
-            ("SHEEN_AT", sheen_at),
-            ("RESCATTER_AT", rescatter_at),
-            ("FILTER_AT", filter_at),
-            ("ROWS_AT", rows_at),
+            ("STACK_SIZE", constants.stack_size),
+            ("SHARED_STACK_SIZE", constants.shared_stack_size),
+            ("VERTEX_TEXELS", constants.vertex.count),
+            ("SECOND_UV_TEXEL", constants.vertex.second_uv),
+            ("TANGENT_TEXEL", constants.vertex.tangent),
+            ("COLOR_TEXEL", constants.vertex.color),
+            ("TEXTURES_IN_SCENE", constants.textures_in_scene),
+            ("ALBEDO_AT", constants.albedo_at),
+            ("SHEEN_AT", constants.sheen_at),
+            ("RESCATTER_AT", constants.rescatter_at),
+            ("FILTER_AT", constants.filter_at),
+            ("ROWS_AT", constants.rows_at),
         ]);
         if kernel.keeps_paths() {
-            let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure } =
-                SlotTexels::of(features);
+            let slot = SlotTexels::of(features);
             declare(&[
-                ("SLOT_TEXELS", count),
-                ("RECEIVER_TEXEL", receiver),
-                ("BODY_TEXEL", body),
-                ("FIRST_HIT_TEXEL", first_hit),
-                ("MAP_SHADOW_TEXEL", map_shadow),
-                ("LAMP_SHADOW_TEXEL", lamp_shadow),
-                ("DEPARTURE_TEXEL", departure),
+                ("SLOT_TEXELS", slot.count),
+                ("RECEIVER_TEXEL", slot.receiver),
+                ("BODY_TEXEL", slot.body),
+                ("FIRST_HIT_TEXEL", slot.first_hit),
+                ("MAP_SHADOW_TEXEL", slot.map_shadow),
+                ("LAMP_SHADOW_TEXEL", slot.lamp_shadow),
+                ("DEPARTURE_TEXEL", slot.departure),
             ]);
         }
         if kernel.shares() {
             let SharedTile { side, owner_side, continuations, map_samples } =
-                shared_tile.unwrap_or(SharedTile::LARGE);
+                constants.shared_tile.unwrap_or(SharedTile::LARGE);
             declare(&[
                 ("TILE_SIDE", side),
                 ("OWNER_SIDE", owner_side),
@@ -279,17 +265,16 @@ impl Program {
             };
             source.push_str(&declaration);
         }
-        for (text, is_needed) in files(kernel, features) {
-            if is_needed {
-                keep_lines(text, features, &mut source);
-            }
+        let files = files(kernel, features).into_iter().filter(|(_, is_needed)| *is_needed);
+        for text in files.map(|(text, _)| text).chain([kernel.source()]) {
+            keep_lines(text, features, &mut source);
         }
         Self { source, bindings }
     }
 }
 
-/// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 67] {
+/// The files before that of the entry point, callees before callers, and whether each is needed.
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -353,22 +338,11 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 67] {
         (wgsl!("count"), view.contains(ViewFeatures::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),
         (wgsl!("sample"), kernel.begins_samples()),
-        (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("anywhere"), kernel.begins_anywhere()),
-        (wgsl!("learn"), kernel == Kernel::Learn),
-        (wgsl!("train"), kernel == Kernel::Train),
         (wgsl!("cast"), kernel.casts()),
-        (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
-        (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
         (wgsl!("words"), kernel.is_of_queue() || kernel.shares()),
         (wgsl!("slots"), kernel.keeps_paths()),
-        (wgsl!("trace"), kernel == Kernel::Trace),
-        (wgsl!("shade"), kernel == Kernel::Shade),
-        (wgsl!("follow_shadows"), kernel == Kernel::FollowShadows),
         (wgsl!("sharing"), kernel.shares()),
-        (wgsl!("find_seconds"), kernel == Kernel::FindSeconds),
-        (wgsl!("light_seconds"), kernel == Kernel::LightSeconds),
-        (wgsl!("connect_seconds"), kernel == Kernel::ConnectSeconds),
     ]
 }
 

@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use super::furniture;
-use super::materials::{self, embossed, matte, textured, two_sided, varnished};
+use super::materials::{self, embossed, matte, palette, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
 use super::objects;
@@ -20,41 +20,8 @@ const THICKNESS: f32 = 0.24;
 const WINDOW: [f32; 4] = [1.2, 0.5, 3.8, 2.3];
 const ROUND: [f32; 3] = [4.4, 1.9, 0.45];
 
-struct Palette {
-    wall: Mat,
-    accent: Mat,
-    ceiling: Mat,
-    parquet: Mat,
-    white: Mat,
-    oak: Mat,
-    walnut: Mat,
-    velvet: Mat,
-    boucle: Mat,
-    linen: Mat,
-    shade: Mat,
-    bulbs: [Mat; 2],
-    cotton: Mat,
-    curtain: Mat,
-    rug: Mat,
-    brass: Mat,
-    copper: Mat,
-    steel: Mat,
-    ceramic: Mat,
-    stone: Mat,
-    clay: Mat,
-    soil: Mat,
-    leaf: Mat,
-    bark: Mat,
-    glass: Mat,
-    black: Mat,
-    cover: Mat,
-    paper: Mat,
-    skin: Mat,
-    arts: [Mat; 3],
-}
-
-impl Palette {
-    fn new(b: &mut Builder, lamps: [f32; 3]) -> Self {
+palette! {
+    new(b, lamps: [f32; 3]) {
         let size = Vec2::splat(1.9);
         let parquet = b.texture(textures::herringbone([0.46, 0.29, 0.16]), size);
         let blocks = b.data(reliefs::herringbone(size), size);
@@ -82,49 +49,43 @@ impl Palette {
             let art = b.texture(textures::painting(k), Vec2::ONE);
             b.material(textured("painting", art, 0.55))
         });
-        Self {
-            wall: b.material(embossed(textured("wall", plaster, 0.85), trowel)),
-            accent: b.material(embossed(textured("green wall", accent, 0.8), trowel)),
-            ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.77], 0.9)),
-            parquet: b.material(embossed(
-                varnished(textured("parquet", parquet, 0.55), 0.35, 0.22),
-                blocks,
-            )),
-            white: b.material(matte("white paint", [0.78, 0.77, 0.74], 0.35)),
-            oak: b.material(embossed(textured("oak", oak, 0.5), grain)),
-            walnut: b
-                .material(embossed(varnished(textured("walnut", walnut, 0.5), 0.6, 0.15), grain)),
-            velvet: b.material(embossed(textured("velvet", velvet, 0.9), pile)),
-            boucle: b.material(embossed(textured("boucle", boucle, 0.95), loops)),
-            linen: b.material(two_sided(textured("linen", linen, 0.9))),
-            shade: b.material(Material {
-                emissive: WARM * lamps[0],
-                ..two_sided(textured("lampshade", linen, 0.9))
-            }),
-            bulbs: [("bulb", lamps[1]), ("bright bulb", lamps[2])].map(|(name, radiance)| {
-                let white = matte(name, [0.78, 0.77, 0.74], 0.35);
-                b.material(Material { emissive: WARM * radiance, ..white })
-            }),
-            cotton: b.material(embossed(textured("cotton", boucle, 0.9), loops)),
-            curtain: b.material(two_sided(textured("ochre linen", ochre, 0.9))),
-            rug: b.material(two_sided(textured("rug", rug, 0.95))),
-            brass: b.material(materials::brass()),
-            copper: b.material(materials::copper()),
-            steel: b.material(materials::steel()),
-            ceramic: b.material(materials::ceramic()),
-            stone: b.material(matte("marble", [0.70, 0.69, 0.67], 0.2)),
-            clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
-            soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
-            leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
-            bark: b.material(matte("bark", [0.22, 0.15, 0.10], 0.9)),
-            glass: b.material(materials::glass("vase glass", [0.86, 0.95, 0.93])),
-            black: b.material(matte("black metal", [0.03, 0.03, 0.03], 0.45)),
-            cover: b.material(matte("book cover", [0.95; 3], 0.7)),
-            paper: b.material(matte("paper", [0.78, 0.75, 0.68], 0.9)),
-            skin: b.material(matte("fruit", [0.95; 3], 0.35)),
-            arts,
-        }
     }
+    wall = embossed(textured("wall", plaster, 0.85), trowel),
+    accent = embossed(textured("green wall", accent, 0.8), trowel),
+    ceiling = matte("ceiling", [0.80, 0.79, 0.77], 0.9),
+    parquet = embossed(varnished(textured("parquet", parquet, 0.55), 0.35, 0.22), blocks),
+    white = matte("white paint", [0.78, 0.77, 0.74], 0.35),
+    oak = embossed(textured("oak", oak, 0.5), grain),
+    walnut = embossed(varnished(textured("walnut", walnut, 0.5), 0.6, 0.15), grain),
+    velvet = embossed(textured("velvet", velvet, 0.9), pile),
+    boucle = embossed(textured("boucle", boucle, 0.95), loops),
+    linen = two_sided(textured("linen", linen, 0.9)),
+    shade = Material {
+        emissive: WARM * lamps[0],
+        ..two_sided(textured("lampshade", linen, 0.9))
+    },
+    bulbs: [Mat; 2] = [("bulb", lamps[1]), ("bright bulb", lamps[2])].map(|(name, radiance)| {
+        let white = matte(name, [0.78, 0.77, 0.74], 0.35);
+        b.material(Material { emissive: WARM * radiance, ..white })
+    }),
+    cotton = embossed(textured("cotton", boucle, 0.9), loops),
+    curtain = two_sided(textured("ochre linen", ochre, 0.9)),
+    rug = two_sided(textured("rug", rug, 0.95)),
+    brass = materials::brass(),
+    copper = materials::copper(),
+    steel = materials::steel(),
+    ceramic = materials::ceramic(),
+    stone = matte("marble", [0.70, 0.69, 0.67], 0.2),
+    clay = matte("terracotta", [0.52, 0.24, 0.14], 0.8),
+    soil = matte("soil", [0.06, 0.04, 0.03], 1.0),
+    leaf = two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4)),
+    bark = matte("bark", [0.22, 0.15, 0.10], 0.9),
+    glass = materials::glass("vase glass", [0.86, 0.95, 0.93]),
+    black = matte("black metal", [0.03, 0.03, 0.03], 0.45),
+    cover = matte("book cover", [0.95; 3], 0.7),
+    paper = matte("paper", [0.78, 0.75, 0.68], 0.9),
+    skin = matte("fruit", [0.95; 3], 0.35),
+    arts: [Mat; 3] = arts,
 }
 
 /// Linear colour of a warm lamp.

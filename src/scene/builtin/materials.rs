@@ -4,6 +4,33 @@ use glam::Vec4;
 
 use crate::scene::{Material, TextureRef, TextureSlot};
 
+/// Declares what a scene is made of: materials in the order in which `Palette::new` makes them, after what it
+/// prepares for them with a builder. What has a type is made as it is told.
+macro_rules! palette {
+    (
+        new($builder:ident $(, $argument:ident: $argument_type:ty)*) { $($preparation:tt)* }
+        $($name:ident $(: $type:ty)? = $value:expr,)+
+    ) => {
+        struct Palette {
+            $($name: palette!(@type $($type)?)),+
+        }
+
+        impl Palette {
+            fn new($builder: &mut Builder $(, $argument: $argument_type)*) -> Self {
+                $($preparation)*
+                Self {
+                    $($name: palette!(@value $builder, $value $(, $type)?)),+
+                }
+            }
+        }
+    };
+    (@type) => { Mat };
+    (@type $type:ty) => { $type };
+    (@value $builder:ident, $material:expr) => { $builder.material($material) };
+    (@value $builder:ident, $value:expr, $type:ty) => { $value };
+}
+pub(super) use palette;
+
 /// A dielectric of linear albedo `rgb`.
 pub(super) fn matte(name: &str, rgb: [f32; 3], roughness: f32) -> Material {
     Material {

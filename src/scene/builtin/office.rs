@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use super::furniture;
-use super::materials::{self, embossed, matte, metal, textured, two_sided, varnished};
+use super::materials::{self, embossed, matte, metal, palette, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects;
@@ -20,35 +20,8 @@ const THICKNESS: f32 = 0.2;
 /// Holes of the windows: the frames leave 1.0 x 0.9 m.
 const WINDOWS: [[f32; 4]; 2] = [[0.44, 1.14, 1.56, 2.16], [2.44, 1.14, 3.56, 2.16]];
 
-struct Palette {
-    wall: Mat,
-    feature: Mat,
-    ceiling: Mat,
-    boards: Mat,
-    white: Mat,
-    oak: Mat,
-    cloth: Mat,
-    sofa: Mat,
-    curtain: Mat,
-    rug: Mat,
-    fringe: Mat,
-    plastic: Mat,
-    keys: Mat,
-    screen: Mat,
-    steel: Mat,
-    brass: Mat,
-    lamp: Mat,
-    ceramic: Mat,
-    clay: Mat,
-    soil: Mat,
-    leaf: Mat,
-    cover: Mat,
-    paper: Mat,
-    arts: [Mat; 2],
-}
-
-impl Palette {
-    fn new(b: &mut Builder) -> Self {
+palette! {
+    new(b) {
         let size = Vec2::new(2.6, 1.6);
         let boards = b.texture(textures::planks([0.40, 0.27, 0.16], 10, 2), size);
         let joints = b.data(reliefs::planks(size, 10, 2), size);
@@ -72,36 +45,31 @@ impl Palette {
             let art = b.texture(textures::painting(k), Vec2::ONE);
             b.material(textured("painting", art, 0.55))
         });
-        Self {
-            wall: b.material(embossed(textured("wall", plaster, 0.85), trowel)),
-            feature: b.material(embossed(textured("clay wall", feature, 0.85), trowel)),
-            ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.78], 0.9)),
-            boards: b.material(embossed(
-                varnished(textured("floor boards", boards, 0.55), 0.35, 0.25),
-                joints,
-            )),
-            white: b.material(matte("white paint", [0.78, 0.77, 0.75], 0.35)),
-            oak: b.material(embossed(varnished(textured("oak", oak, 0.5), 0.4, 0.25), grain)),
-            cloth: b.material(embossed(two_sided(textured("blue cloth", blue, 0.9)), threads)),
-            sofa: b.material(embossed(textured("grey cloth", grey, 0.9), threads)),
-            curtain: b.material(two_sided(textured("curtain", linen, 0.9))),
-            rug: b.material(two_sided(textured("rug", rug, 0.95))),
-            fringe: b.material(matte("fringe", [0.62, 0.58, 0.5], 0.95)),
-            plastic: b.material(matte("black plastic", [0.035, 0.036, 0.04], 0.4)),
-            keys: b.material(matte("keys", [0.62, 0.62, 0.61], 0.45)),
-            screen: b.material(matte("screen", [0.012, 0.013, 0.016], 0.12)),
-            steel: b.material(materials::steel()),
-            brass: b.material(materials::brass()),
-            lamp: b.material(metal("green enamel", [0.10, 0.22, 0.17], 0.25)),
-            ceramic: b.material(materials::ceramic()),
-            clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
-            soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
-            leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
-            cover: b.material(matte("book cover", [0.95; 3], 0.7)),
-            paper: b.material(matte("paper", [0.78, 0.76, 0.72], 0.9)),
-            arts,
-        }
     }
+    wall = embossed(textured("wall", plaster, 0.85), trowel),
+    feature = embossed(textured("clay wall", feature, 0.85), trowel),
+    ceiling = matte("ceiling", [0.80, 0.79, 0.78], 0.9),
+    boards = embossed(varnished(textured("floor boards", boards, 0.55), 0.35, 0.25), joints),
+    white = matte("white paint", [0.78, 0.77, 0.75], 0.35),
+    oak = embossed(varnished(textured("oak", oak, 0.5), 0.4, 0.25), grain),
+    cloth = embossed(two_sided(textured("blue cloth", blue, 0.9)), threads),
+    sofa = embossed(textured("grey cloth", grey, 0.9), threads),
+    curtain = two_sided(textured("curtain", linen, 0.9)),
+    rug = two_sided(textured("rug", rug, 0.95)),
+    fringe = matte("fringe", [0.62, 0.58, 0.5], 0.95),
+    plastic = matte("black plastic", [0.035, 0.036, 0.04], 0.4),
+    keys = matte("keys", [0.62, 0.62, 0.61], 0.45),
+    screen = matte("screen", [0.012, 0.013, 0.016], 0.12),
+    steel = materials::steel(),
+    brass = materials::brass(),
+    lamp = metal("green enamel", [0.10, 0.22, 0.17], 0.25),
+    ceramic = materials::ceramic(),
+    clay = matte("terracotta", [0.52, 0.24, 0.14], 0.8),
+    soil = matte("soil", [0.06, 0.04, 0.03], 1.0),
+    leaf = two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4)),
+    cover = matte("book cover", [0.95; 3], 0.7),
+    paper = matte("paper", [0.78, 0.76, 0.72], 0.9),
+    arts: [Mat; 2] = arts,
 }
 
 /// Builds the scene.

@@ -62,22 +62,20 @@ pub(super) fn armchair(b: &mut Builder, cloth: Mat, wood: Mat) {
         let r = 0.37 - inward;
         Vec3::new(r * s * lean, 0.26 + up * height, r * c * lean * 0.98)
     };
-    b.sheet(cloth, [48, 24], Vec2::new(1.6, 1.2), |u, v| {
-        // v runs once around the shell's section: outside, top, inside, bottom.
-        let (s, c) = (v * TAU).sin_cos();
+    // `turn` runs once around the shell's section: outside, top, inside, bottom.
+    let section = |along: f32, turn: f32| {
+        let (s, c) = (turn * TAU).sin_cos();
         let up = 0.5 - 0.5 * c.signum() * c.abs().powf(0.35);
         let inward = 0.045 * (1.0 - s.signum() * s.abs().powf(0.6));
-        wall(u, inward, up)
-    });
+        wall(along, inward, up)
+    };
+    b.sheet(cloth, [48, 24], Vec2::new(1.6, 1.2), section);
     for end in [0.0, 1.0] {
         b.sheet(cloth, [8, 24], Vec2::new(0.1, 1.2), |u, v| {
             let turn = if end > 0.5 { 1.0 - v } else { v };
-            let (s, c) = (turn * TAU).sin_cos();
-            let up = 0.5 - 0.5 * c.signum() * c.abs().powf(0.35);
-            let inward = 0.045 * (1.0 - s.signum() * s.abs().powf(0.6));
             let middle = wall(end, 0.045, 0.5);
             let bulge = Vec3::new((end - 0.5) * -0.05, 0.0, 0.035) * (1.0 - u * u);
-            middle.lerp(wall(end, inward, up), u) + bulge
+            middle.lerp(section(end, turn), u) + bulge
         });
     }
 }

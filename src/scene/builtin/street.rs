@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::facade::{self, HouseMats};
-use super::materials::{self, matte, textured, two_sided};
+use super::materials::{self, matte, palette, textured, two_sided};
 use super::mesh::{Builder, Mat};
 use super::objects;
 use super::plants;
@@ -15,29 +15,8 @@ use super::textures;
 use super::{lamps, seating};
 use crate::scene::{Medium, Scene};
 
-struct Palette {
-    cobbles: Mat,
-    kerb: Mat,
-    iron: Mat,
-    lantern: Mat,
-    awning: Mat,
-    wood: Mat,
-    cane: Mat,
-    marble: Mat,
-    ceramic: Mat,
-    coffee: Mat,
-    clay: Mat,
-    soil: Mat,
-    bark: Mat,
-    leaf: Mat,
-    brick_house: HouseMats,
-    ochre_house: HouseMats,
-    pale_house: HouseMats,
-    stone_house: HouseMats,
-}
-
-impl Palette {
-    fn new(b: &mut Builder) -> Self {
+palette! {
+    new(b) {
         let cobbles =
             b.texture(textures::stones([0.40, 0.38, 0.35], 16, 10, 0.07), Vec2::new(2.4, 2.0));
         let flags = b.texture(textures::stones([0.50, 0.48, 0.44], 4, 3, 0.012), Vec2::splat(2.4));
@@ -66,27 +45,25 @@ impl Palette {
         let blue = b.material(matte("blue shutter", [0.16, 0.26, 0.36], 0.45));
         let house =
             |wall, shutter| HouseMats { wall, base: ashlar, trim, frame, pane, roof, shutter };
-        Self {
-            cobbles: b.material(textured("cobbles", cobbles, 0.6)),
-            kerb: b.material(textured("flagstones", flags, 0.7)),
-            iron: b.material(matte("painted iron", [0.03, 0.04, 0.04], 0.4)),
-            lantern: b.material(matte("frosted glass", [0.72, 0.70, 0.64], 0.25)),
-            awning: b.material(two_sided(textured("awning", stripes, 0.9))),
-            wood: b.material(textured("teak", teak, 0.55)),
-            cane: b.material(matte("cane", [0.58, 0.42, 0.22], 0.6)),
-            marble: b.material(matte("marble", [0.70, 0.69, 0.67], 0.2)),
-            ceramic: b.material(materials::ceramic()),
-            coffee: b.material(matte("coffee", [0.04, 0.02, 0.01], 0.1)),
-            clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
-            soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
-            bark: b.material(matte("bark", [0.20, 0.15, 0.11], 0.95)),
-            leaf: b.material(two_sided(matte("leaf", [0.13, 0.26, 0.07], 0.5))),
-            brick_house: house(brick, None),
-            ochre_house: house(ochre, Some(green)),
-            pale_house: house(pale, Some(blue)),
-            stone_house: house(ashlar, None),
-        }
     }
+    cobbles = textured("cobbles", cobbles, 0.6),
+    kerb = textured("flagstones", flags, 0.7),
+    iron = matte("painted iron", [0.03, 0.04, 0.04], 0.4),
+    lantern = matte("frosted glass", [0.72, 0.70, 0.64], 0.25),
+    awning = two_sided(textured("awning", stripes, 0.9)),
+    wood = textured("teak", teak, 0.55),
+    cane = matte("cane", [0.58, 0.42, 0.22], 0.6),
+    marble = matte("marble", [0.70, 0.69, 0.67], 0.2),
+    ceramic = materials::ceramic(),
+    coffee = matte("coffee", [0.04, 0.02, 0.01], 0.1),
+    clay = matte("terracotta", [0.52, 0.24, 0.14], 0.8),
+    soil = matte("soil", [0.06, 0.04, 0.03], 1.0),
+    bark = matte("bark", [0.20, 0.15, 0.11], 0.95),
+    leaf = two_sided(matte("leaf", [0.13, 0.26, 0.07], 0.5)),
+    brick_house: HouseMats = house(brick, None),
+    ochre_house: HouseMats = house(ochre, Some(green)),
+    pale_house: HouseMats = house(pale, Some(blue)),
+    stone_house: HouseMats = house(ashlar, None),
 }
 
 /// Builds the scene `exterior`.

@@ -18,6 +18,7 @@ use super::document::Document;
 use super::limits::Fallible;
 use super::pose::{EXTRAS, Nodes, Tops};
 use crate::error::Notices;
+use crate::math::box_corners;
 use crate::scene::{Frame, Medium};
 
 /// The medium of the shown scene or, without one, of its first node that has one.
@@ -38,13 +39,10 @@ pub(super) fn medium(
         let Some(keys) = fog(&document.nodes.get(node)?.extras) else { continue };
         let Some(medium) = read(&keys, &format!("node {node}"), notices) else { continue };
         let world = nodes.world(node);
-        let corners = (0..8).map(|corner| {
-            let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            world.transform_point3(DVec3::new(sign(0), sign(1), sign(2))).as_vec3()
-        });
-        let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
-            (low.min(corner), high.max(corner))
-        });
+        let corners = box_corners([DVec3::NEG_ONE, DVec3::ONE]);
+        let corners = corners.map(|corner| world.transform_point3(corner).as_vec3());
+        let low = corners.into_iter().fold(Vec3::MAX, Vec3::min);
+        let high = corners.into_iter().fold(Vec3::MIN, Vec3::max);
         media.push(Medium { bounds: Some([low, high]), ..frame.thinned(medium) });
     }
     if media.len() > 1 {

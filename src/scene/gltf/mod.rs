@@ -349,39 +349,35 @@ impl Reading<'_> {
 
 /// A clause for each kind of repair that was needed.
 fn repairs(tally: &Tally) -> Vec<String> {
-    let Tally {
-        points,
-        lines,
-        without_positions,
-        dropped_triangles,
-        bad_normals,
-        bad_values,
-        short_attributes,
-        copied_instances,
-        copied_triangles,
-    } = tally;
     let mut repairs = Vec::new();
-    if points + lines > 0 {
+    if tally.points + tally.lines > 0 {
         repairs.push(format!(
-            "{points} point and {lines} line primitives were skipped: only triangles are rendered"
+            "{} point and {} line primitives were skipped: only triangles are rendered",
+            tally.points, tally.lines
         ));
     }
     for (count, what) in [
-        (without_positions, "primitives without positions were skipped"),
+        (tally.without_positions, "primitives without positions were skipped"),
         (
-            dropped_triangles,
+            tally.dropped_triangles,
             "triangles without area or with corners that are not finite or beyond 1e18 m were dropped",
         ),
-        (bad_normals, "unusable vertex normals were ignored: shading is flat there"),
-        (bad_values, "texture coordinates or colours that are not finite were replaced"),
+        (tally.bad_normals, "unusable vertex normals were ignored: shading is flat there"),
+        (tally.bad_values, "texture coordinates or colours that are not finite were replaced"),
         (
-            short_attributes,
+            tally.short_attributes,
             "normals, tangents, texture coordinates or colours with too few elements were left out",
         ),
-        (copied_instances, "instances were left out: each is a copy of another in the same place"),
-        (copied_triangles, "triangles were left out: each is a copy of another in the same place"),
+        (
+            tally.copied_instances,
+            "instances were left out: each is a copy of another in the same place",
+        ),
+        (
+            tally.copied_triangles,
+            "triangles were left out: each is a copy of another in the same place",
+        ),
     ] {
-        if *count > 0 {
+        if count > 0 {
             repairs.push(format!("{count} {what}"));
         }
     }

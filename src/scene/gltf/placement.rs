@@ -14,6 +14,7 @@ use super::buffers::File;
 use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use super::pose::{self, MESH, Nodes};
 use super::primitive::Mesh;
+use crate::math::box_corners;
 use crate::scene::copies::{copies, hash_of};
 
 /// A node that shows a mesh.
@@ -66,10 +67,7 @@ pub(super) fn bounds(
             let joints = skin.and_then(|skin| pose::joint_transforms(file, nodes, skin).ok());
             let transforms = joints.as_ref().unwrap_or(&placement.instances).iter();
             corners.extend(transforms.flat_map(|transform| {
-                (0..8).map(move |corner| {
-                    let at = |axis: usize| around[corner >> axis & 1][axis];
-                    transform.transform_point3(DVec3::new(at(0), at(1), at(2)))
-                })
+                box_corners(around).map(|corner| transform.transform_point3(corner))
             }));
         }
     }

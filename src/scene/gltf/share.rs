@@ -19,6 +19,7 @@ use super::part::Part;
 use super::placement::Placement;
 use super::primitive::Mesh;
 use crate::bvh;
+use crate::math::box_corners;
 use crate::memory;
 use crate::scene::{Instance, Instances, MAX_SHOWN, Placing, Scene};
 
@@ -124,11 +125,9 @@ pub(super) fn extent(parts: &[&Part]) -> f32 {
 /// Whether what has this extent can be shared where it is placed so.
 pub(super) fn can_share(place: DAffine3, extent: f32) -> bool {
     let placing = Placing::new(place);
-    let corner = |bits: u32| {
-        let side = |axis: u32| if bits >> axis & 1 == 0 { extent } else { -extent };
-        placing.position(Vec3::new(side(0), side(1), side(2)))
-    };
-    bvh::Instance::can_be_walked(place) && (0..8).all(|bits| bake::is_near(corner(bits)))
+    let corners = box_corners([-extent, extent].map(Vec3::splat));
+    let is_near = |corner: Vec3| bake::is_near(placing.position(corner));
+    bvh::Instance::can_be_walked(place) && corners.into_iter().all(is_near)
 }
 
 /// Triangles that a primitive says it has; 0 of what is not drawn as triangles.
