@@ -74,6 +74,19 @@ impl Album {
         let (time, process) = (since.as_millis(), std::process::id());
         let file = self.folder.join(format!("{time:015}-{process}-{:04}.exr", self.written));
         self.written += 1;
+        self.write_to(file.clone(), kept, small)?;
+        Ok(file)
+    }
+
+    /// Writes a picture's file again, if it has one: its name is another.
+    pub(super) fn write_again(&self, kept: &KeptPicture) -> Result<()> {
+        let Some(file) = &kept.file else { return Ok(()) };
+        let [width, height] = kept.small.size.map(|size| size as u32);
+        let pixels = kept.small.pixels.iter().map(|color| [color.r(), color.g(), color.b()]);
+        self.write_to(file.clone(), kept, &Rgb8 { width, height, pixels: pixels.collect() })
+    }
+
+    fn write_to(&self, file: PathBuf, kept: &KeptPicture, small: &Rgb8) -> Result<()> {
         let document = &kept.document;
         let lasting = Document {
             scene: settings_file::lasting_scene(&document.scene),
@@ -88,7 +101,6 @@ impl Album {
         ];
         let texts = texts.map(|(key, text)| (key.to_owned(), text));
         let (pixels, small) = (Arc::clone(&kept.pixels), small.clone());
-        let place = file.clone();
         self.send(move || {
             if let Some(folder) = file.parent() {
                 std::fs::create_dir_all(folder).at(folder)?;
@@ -99,7 +111,7 @@ impl Album {
             pixels.leave_to(file);
             Ok(())
         });
-        Ok(place)
+        Ok(())
     }
 
     /// Removes a picture's file.
@@ -291,6 +303,13 @@ mod tests {
         assert_eq!(kept[1].small, color_image(&small));
         assert_eq!(kept[1].pixels.get(), Ok(image));
         let first = kept[0].file.clone().expect("a file");
+        let renamed = KeptPicture { name: "Before noon".to_owned(), ..read(&first).expect("read") };
+        album.write_again(&renamed).expect("told");
+        drop(album);
+        let again = read(&first).expect("written again");
+        assert_eq!((&*again.name, &again.small), ("Before noon", &kept[0].small));
+        assert_eq!((again.pixels.get(), &again.document), (kept[1].pixels.get(), &expected));
+        let (album, _report) = open(&folder);
         let taken_away = folder.join("away");
         fs::rename(&first, &taken_away).expect("renamed");
         let sentence = kept[0].pixels.get().expect_err("it is not there");

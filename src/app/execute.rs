@@ -142,6 +142,11 @@ impl App {
             Command::CloseSheets => (interface.shortcuts, interface.tool) = (false, None),
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => self.set_as_kept(index),
+            Command::RenameKept(index) => {
+                if let Err(error) = self.library.history.rename(index) {
+                    self.messages.error(error.to_string());
+                }
+            }
             Command::ToggleZoom => interface.toggle_zoom(document.size),
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,

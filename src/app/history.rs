@@ -86,6 +86,16 @@ impl History {
         kept.of_scene != self.of_scene
     }
 
+    /// Keeps a picture's new name for the next window.
+    ///
+    /// # Errors
+    /// If it cannot be kept.
+    pub(crate) fn rename(&mut self, index: usize) -> Result<()> {
+        let Some(kept) = self.list.get_mut(index) else { return Ok(()) };
+        kept.name = kept.name.trim().to_owned();
+        self.album.as_ref().map_or(Ok(()), |album| album.write_again(kept))
+    }
+
     /// Drops one, and its file.
     pub(crate) fn remove(&mut self, index: usize) {
         let kept = self.list.remove(index);

@@ -13,6 +13,9 @@ use crate::app::theme;
 /// Height of a small picture in points.
 const HEIGHT: f32 = 48.0;
 
+/// Most characters of a name.
+const MAX_NAME: usize = 80;
+
 /// Draws the list: two can be chosen to be compared, or one and what is rendered.
 pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &mut History) {
     let (chosen, commands) = (&mut controls.interface.compared, &mut *controls.commands);
@@ -35,7 +38,15 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &m
             }
             ui.vertical(|ui| {
                 ui.spacing_mut().item_spacing.y = 2.0;
-                ui.label(&kept.name);
+                let name = egui::TextEdit::singleline(&mut kept.name)
+                    .char_limit(MAX_NAME)
+                    .desired_width(ui.available_width())
+                    .frame(egui::Frame::NONE)
+                    .hint_text("Name");
+                let name = ui.add(name).on_hover_text("Click to write a name or a note");
+                if name.lost_focus() {
+                    commands.push(Command::RenameKept(i));
+                }
                 ui.label(theme::quiet(&kept.summary));
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = 4.0;
