@@ -68,7 +68,7 @@ impl Display {
     ) {
         let look = &document.look;
         let request = &snapshot.request;
-        // Overlays and what is beside a picture wait for it.
+        // Overlays and comparisons wait for the rendered picture.
         let is_alone = overlay.is_none() && compared.is_none() && snapshot.plain.is_none();
         let is_ahead = |latest: &Arc<Request>| match latest.moving {
             true => latest.view != request.view,

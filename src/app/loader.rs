@@ -180,7 +180,7 @@ struct InFlight {
     step: Arc<Mutex<&'static str>>,
 }
 
-/// How a thread says what it is doing, and learns whether anybody still wants it.
+/// By which a thread says what it does, and learns whether its result is still wanted.
 struct Steps(Weak<Mutex<&'static str>>);
 
 impl Steps {

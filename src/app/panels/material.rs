@@ -129,7 +129,7 @@ fn buttons(
         if let Some(copied) = copied
             && small(ui, "Paste").on_hover_text("Look like what was copied").clicked()
         {
-            *edit = *copied;
+            *edit = MaterialEdit { hidden: edit.hidden, ..*copied };
         }
         if *edit != MaterialEdit::default() && small(ui, "Reset").clicked() {
             *edit = MaterialEdit::default();

@@ -71,7 +71,7 @@ impl Carried {
         completed
     }
 
-    /// What is seen of the last picture in a view that is asked for by now; `None` if that is less than half.
+    /// What the last picture shows of the view of the request ahead; `None` if that is less than half.
     pub(super) fn ahead(&self, order: &Order) -> Option<Image> {
         let request = order.ahead.as_ref()?;
         let is_of_use =

@@ -122,13 +122,13 @@ impl Memory {
         }
         let source = Source::main(order);
         if let Some((image, automatic_ev)) = self.ahead(order, &source) {
-            // It is none of the rendered picture's own light.
+            // It has no samples of the request's own.
             let prepared = Prepared { is_carried: true, ..Prepared::of(&developer, image) };
             developer.gpu().check()?;
             let automatic_ev = order.metered.map_or(0.0, |_| automatic_ev);
             return Ok(Some(shown(order, prepared, automatic_ev)));
         }
-        if order.is_left() {
+        if order.still_ahead().is_some() && order.is_left() {
             return Ok(None);
         }
         let prepare = || match self.recent.come_back(order) {
@@ -206,8 +206,8 @@ impl Memory {
         Ok(Some(Shown { other, difference, uncompared, painted, ..shown }))
     }
 
-    /// What was asked for by now as it was left or, if it never was, as it is seen from where the camera was; and the
-    /// automatic stops of that picture. A movement shows more, if the picture before it is ready.
+    /// The request ahead as it was left, else what the last picture shows of its view; and the automatic stops of that
+    /// picture. `None` for a movement whose first picture is ready: with it more is seen.
     fn ahead(&self, order: &Order, source: &Source) -> Option<(Arc<Image>, f32)> {
         if order.latest().moving && self.uploads.picture.is_of(&source.key()) {
             return None;

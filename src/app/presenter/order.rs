@@ -20,7 +20,7 @@ pub(crate) struct Order {
     pub(in crate::app) developer: Arc<Developer>,
     /// The film.
     pub snapshot: Arc<Snapshot>,
-    /// What is asked for by now, if that may be shown before it is rendered.
+    /// The latest request, if something of it may be shown before it is rendered.
     pub ahead: Option<Arc<Request>>,
     /// What takes noise out, if anything shall.
     pub denoiser: Option<Denoiser>,
@@ -68,7 +68,7 @@ impl Order {
         self.ahead.as_ref().unwrap_or(&self.snapshot.request)
     }
 
-    /// What is asked for by now, unless the camera moves.
+    /// The request ahead, unless the camera moves.
     pub(super) fn still_ahead(&self) -> Option<&Arc<Request>> {
         self.ahead.as_ref().filter(|ahead| !ahead.moving)
     }
@@ -92,15 +92,18 @@ impl Order {
         Arc::ptr_eq(request, old) || (request.moving && old.moving)
     }
 
-    /// Whether nobody wants to see from where the picture was rendered any more.
+    /// Whether the camera, or the size, is another one by now than that of the rendered picture. Where light changes,
+    /// pictures of the light before are shown all the same.
     pub(super) fn is_left(&self) -> bool {
-        self.still_ahead().is_some_and(|ahead| ahead.view != self.snapshot.request.view)
+        let request = &self.snapshot.request;
+        let is_elsewhere =
+            |ahead: &Arc<Request>| ahead.view != request.view && request.is_seen_like(ahead);
+        self.ahead.as_ref().is_some_and(is_elsewhere)
     }
 
-    /// Whose view is to be shown. While light is turned each picture is late, and is shown nevertheless.
+    /// The request whose view is shown.
     fn viewed(&self) -> &Arc<Request> {
-        let request = &self.snapshot.request;
-        self.ahead.as_ref().filter(|ahead| ahead.view != request.view).unwrap_or(request)
+        self.ahead.as_ref().filter(|_| self.is_left()).unwrap_or(&self.snapshot.request)
     }
 
     /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
@@ -206,5 +209,8 @@ pub(super) mod tests {
         assert!(elsewhere.is_left() && !elsewhere.is_same_work(&order(&still, 2)));
         let relit = ahead(Request { run: 1, ..(*still).clone() });
         assert!(!relit.is_left() && relit.is_same_work(&order(&still, 2)), "it is seen meanwhile");
+        let mut bounced = (*still).clone();
+        bounced.view.limits.bounces += 1;
+        assert!(!ahead(bounced).is_left(), "as it is while a slider is dragged");
     }
 }

@@ -49,7 +49,7 @@ impl Recent {
         Some((Arc::clone(&kept.image), kept.is_carried))
     }
 
-    /// What was shown when the picture that is asked for by now was left, and its automatic stops.
+    /// What was shown when the picture of the request ahead was left, and its automatic stops.
     pub(super) fn ahead(&self, order: &Order) -> Option<(Arc<Image>, f32)> {
         let kept = self.of(order.still_ahead()?, order.denoiser)?;
         Some((Arc::clone(&kept.image), kept.automatic_ev))
@@ -87,7 +87,7 @@ mod tests {
         let again = Arc::new((*left).clone());
         let (found, is_carried) = recent.come_back(&order(&again)).expect("it is the same picture");
         assert!(Arc::ptr_eq(&found, &image) && is_carried);
-        // It is not rendered yet.
+        // It is asked for, and not rendered yet.
         let mut elsewhere = (*left).clone();
         elsewhere.view.camera.world_from_camera.translation.x += 1.0;
         let ahead = |request: &Arc<Request>| Order {
