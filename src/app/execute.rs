@@ -44,7 +44,13 @@ impl App {
                 interface.paused = false;
                 document.map = name;
             }
-            Command::StopLoading => self.stop_loading(),
+            Command::StopLoading => {
+                for kind in [Kind::Scene, Kind::Map] {
+                    if self.assets.stop_loading(kind) {
+                        self.stay(kind, "loading was cancelled");
+                    }
+                }
+            }
             Command::ReadAgain => {
                 let mut read = |kind| self.assets.read_again(kind, document);
                 interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];

@@ -105,26 +105,35 @@ impl App {
             Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
             None => self.messages.error(error.to_string()),
         }
-        self.keep_scene("its scene cannot be read");
+        self.stay(Kind::Scene, "its scene cannot be read");
     }
 
-    /// Gives up what is being loaded: what is shown stays.
-    pub(super) fn stop_loading(&mut self) {
-        if self.assets.stop_loading(Kind::Scene) {
-            self.keep_scene("its scene is not read");
+    /// The scene or the map that is shown stays, and the document says so again. `why` is told where a picture of the
+    /// other one was to be saved.
+    pub(super) fn stay(&mut self, kind: Kind, why: &str) {
+        match kind {
+            // One that is read again is still shown.
+            Kind::Scene => {
+                if self.assets.scene_of(&self.edited.document).is_none() {
+                    self.messages.errors(self.saves.give_up(why));
+                }
+                stay_in_scene(&mut self.edited, &self.assets, &self.library);
+            }
+            Kind::Map => {
+                if self.rendering.snapshot.is_none() {
+                    self.messages.errors(self.saves.give_up(why));
+                }
+                let shown = self.assets.map.as_ref();
+                let shown = shown.map(|map| (map.name.clone(), map.sun_factor));
+                // At the start there is none: the built-in one is always there.
+                let default = || {
+                    let Document { map, sun, .. } = Document::default();
+                    (map, sun)
+                };
+                let (map, sun) = shown.unwrap_or_else(default);
+                self.edited.put_back(|document| (document.map, document.sun) = (map, sun));
+            }
         }
-        if self.assets.stop_loading(Kind::Map) {
-            self.keep_map();
-        }
-    }
-
-    /// The scene that is shown stays, for this reason.
-    fn keep_scene(&mut self, why: &str) {
-        // One that is read again is still shown.
-        if self.assets.scene_of(&self.edited.document).is_none() {
-            self.messages.errors(self.saves.give_up(why));
-        }
-        stay_in_scene(&mut self.edited, &self.assets, &self.library);
     }
 
     fn take_map(&mut self, map: LoadedMap) {
@@ -150,21 +159,7 @@ impl App {
             Some(_) => self.messages.not_opened(Kind::Map, error.to_string()),
             None => self.messages.error(error.to_string()),
         }
-        self.keep_map();
-    }
-
-    /// The map that is shown stays.
-    fn keep_map(&mut self) {
-        let shown = self.assets.map.as_ref().map(|map| (map.name.clone(), map.sun_factor));
-        // At the start there is none: the built-in one is always there.
-        let (map, sun) = shown.unwrap_or_else(|| {
-            let Document { map, sun, .. } = Document::default();
-            (map, sun)
-        });
-        if self.rendering.snapshot.is_none() {
-            self.messages.errors(self.saves.give_up("there is no picture"));
-        }
-        self.edited.put_back(|document| (document.map, document.sun) = (map, sun));
+        self.stay(Kind::Map, "there is no picture");
     }
 
     fn take_result(&mut self, result: TaskResult, context: &egui::Context) {
