@@ -132,7 +132,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11223),
+    ("app", 11393),
     ("bench", 578),
     ("bsdf", 1412),
     ("bvh", 1332),
@@ -155,7 +155,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("noise", 79),
     ("out_of_memory", 78),
     ("output", 607),
-    ("path", 2779),
+    ("path", 2788),
     ("prefetch", 14),
     ("radiance_cache", 329),
     ("render", 6551),
