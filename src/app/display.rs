@@ -88,9 +88,9 @@ impl Display {
         });
     }
 
-    /// Whether what was ordered last is shown.
+    /// Whether what was ordered last is shown: what is ready since [`Self::collect`] is not.
     pub(super) fn is_settled(&self) -> bool {
-        self.presenter.is_settled()
+        self.presenter.has_made(self.shown.as_deref())
     }
 
     /// Stops in all, once the automatic ones are known.

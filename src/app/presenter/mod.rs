@@ -75,10 +75,9 @@ impl Presenter {
         lock(&self.shown).clone()
     }
 
-    /// Whether the last order is what is shown.
-    pub(crate) fn is_settled(&self) -> bool {
-        let shown = self.shown();
-        shown.as_ref().map(|s| &s.order) == self.ordered.as_ref()
+    /// Whether this is what was ordered last.
+    pub(crate) fn has_made(&self, shown: Option<&Shown>) -> bool {
+        shown.map(|shown| &shown.order) == self.ordered.as_ref()
     }
 }
 
