@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::order::Order;
@@ -19,6 +18,8 @@ const MAX_PIXELS: u64 = 1 << 20;
 const WORTH: f64 = 4.0;
 /// Largest weight of a picture of another size through the same camera; smaller if that has fewer samples.
 const MAX_WORTH: f64 = 64.0;
+/// Width in pixels of a picture that only gives colours.
+const BLURRED_WIDTH: u32 = 8;
 /// Pixels along an edge of the blocks whose light is compared.
 const BLOCK: usize = 16;
 /// By what share of their light blocks may differ before what is carried counts less, and where it counts nothing, once
@@ -37,6 +38,8 @@ struct Whole {
     /// What it was rendered for.
     request: Arc<Request>,
     keyframe: Keyframe,
+    /// The picture with a few pixels: colours for what it does not show.
+    blurred: Image,
     /// A pixel, in the mean.
     samples: f64,
 }
@@ -44,9 +47,10 @@ struct Whole {
 impl Whole {
     fn new(snapshot: &Snapshot, image: Arc<Image>) -> Option<Self> {
         let (request, film) = (&snapshot.request, &snapshot.main.film);
+        let blurred = image.shrunk(BLURRED_WIDTH);
         let keyframe = Keyframe::new(&request.world, &request.view, film, image)?;
         let samples = snapshot.film_samples();
-        Some(Self { request: Arc::clone(request), keyframe, samples })
+        Some(Self { request: Arc::clone(request), keyframe, blurred, samples })
     }
 
     /// Its weight in samples a pixel beside a picture of `view` with `samples` of its own.
@@ -79,13 +83,8 @@ impl Carried {
         let last = self.last.as_ref().filter(is_of_use)?;
         let view = carried_view(&request.view);
         let seen = last.keyframe.seen_in(&view, None);
-        let colors: Vec<Vec3> = seen.iter().flatten().map(|color| Vec3::from(*color)).collect();
-        if 2 * colors.len() < seen.len() {
-            return None;
-        }
-        let mean = colors.iter().sum::<Vec3>() / colors.len() as f32;
-        let elsewhere = Image { width: 1, height: 1, pixels: vec![mean.into()] };
-        Some(under(&seen, &elsewhere, [view.width, view.height]))
+        let is_half = 2 * seen.iter().flatten().count() >= seen.len();
+        is_half.then(|| under(&seen, &last.blurred, [view.width, view.height]))
     }
 
     /// Keeps what is seen, if it is a whole picture at rest.
@@ -314,7 +313,7 @@ mod tests {
         let aside = ahead(&|view| view.camera.world_from_camera.translation.x += 0.1);
         let aside = aside.expect("most is seen");
         assert_eq!((aside.width, aside.height), (48, 36));
-        assert!(aside.pixels.iter().all(|pixel| Vec3::from(*pixel).is_finite()));
+        assert!(aside.pixels.as_flattened().iter().all(|value| value.is_finite()));
         let turned = glam::Affine3A::from_rotation_y(3.0);
         let away = ahead(&|view| view.camera.world_from_camera.matrix3 *= turned.matrix3);
         assert!(away.is_none() && ahead(&|_| ()).is_none(), "nothing of it is seen, or all");
