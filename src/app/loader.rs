@@ -101,7 +101,6 @@ pub struct LoadedMap {
 impl LoadedMap {
     /// Reads a map.
     fn read(name: &str, sun_factor: f32, steps: &Steps) -> Result<Self> {
-        steps.begin("reading")?;
         let start = Instant::now();
         let (map, notices) = sources::map(name)?;
         steps.begin("building the table")?;
@@ -180,7 +179,7 @@ struct InFlight {
     step: Arc<Mutex<&'static str>>,
 }
 
-/// By which a thread says what it does, and learns whether its result is still wanted.
+/// Reports a thread's steps, and tells it whether its result is still wanted.
 struct Steps(Weak<Mutex<&'static str>>);
 
 impl Steps {
@@ -309,6 +308,9 @@ impl Loader {
         let name = name.to_owned();
         let thread = spawn("load", move || {
             let _turn = lock(&turn);
+            if steps.begin(if is_edit { "changing" } else { "reading" }).is_err() {
+                return;
+            }
             // A panic must not leave the window waiting for ever.
             let failed = || Error::at(&name, "cannot be read: the program failed at it");
             let loaded = catch_panic(|| load(&steps)).unwrap_or_else(|| match kind {
@@ -326,7 +328,6 @@ impl Loader {
 }
 
 fn load_scene(name: &str, options: &SceneOptions, steps: &Steps) -> Result<LoadedScene> {
-    steps.begin("reading")?;
     let start = Instant::now();
     let scene = sources::scene_with(name, options)?;
     steps.begin("building the tree")?;

@@ -108,8 +108,8 @@ impl App {
         self.stay(Kind::Scene, "its scene cannot be read");
     }
 
-    /// The scene or the map that is shown stays, and the document says so again. `why` is told where a picture of the
-    /// other one was to be saved.
+    /// Puts the scene or the map that is shown back into the document. Pictures of the other one that were to be saved
+    /// are given up; `why` is the reason.
     pub(super) fn stay(&mut self, kind: Kind, why: &str) {
         match kind {
             // One that is read again is still shown.

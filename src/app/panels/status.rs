@@ -44,7 +44,7 @@ const GRADES: [(&str, Color32, &str, [f32; 2]); 3] = [
     ("Draft", theme::SECOND, "Light and shadows may still change", [f32::INFINITY; 2]),
 ];
 
-/// Seconds after which it is told how loading goes on.
+/// Seconds after which the step and the time of loading are shown.
 const MIN_LOADING_SECONDS: f64 = 1.0;
 
 /// Draws the line.

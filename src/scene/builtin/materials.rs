@@ -5,7 +5,7 @@ use glam::Vec4;
 use crate::scene::{Material, TextureRef, TextureSlot};
 
 /// Declares what a scene is made of: materials in the order in which `Palette::new` makes them, after what it
-/// prepares for them with a builder. What has a type is made as it is told.
+/// prepares for them with a builder. An entry without a type is a material; one with a type is an expression of it.
 macro_rules! palette {
     (
         new($builder:ident $(, $argument:ident: $argument_type:ty)*) { $($preparation:tt)* }
