@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::preview::MAX_GAP;
 use super::snapshot::PublishThrottle;
 use super::*;
 use crate::environment::{Environment, EnvironmentOptions, sky};
@@ -189,7 +190,9 @@ fn the_cpu_goes_on_until_a_gpu_is_ready() {
         counts.extend(snapshot.map(|snapshot| snapshot.now.samples));
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(counts.len() > 1, "it stood still: {counts:?}");
+    // Caches of drivers may make it quick: there is a picture in each gap at least.
+    let least = (start.elapsed().as_millis() / MAX_GAP.as_millis()).clamp(1, 3) as usize;
+    assert!(counts.len() > least, "it stood still: {counts:?}");
     let now = worker.snapshot().expect("there was one").now;
     assert!(counts.iter().all(|count| *count <= now.samples), "nothing of it is lost");
     // The next moments of the same scene have their kernels.
