@@ -84,8 +84,8 @@ pub enum Command {
     KeepPicture,
     /// Set everything as it was for a kept picture.
     SetAsKept(usize),
-    /// Keep the new name of a kept picture.
-    RenameKept(usize),
+    /// Give a kept picture another name.
+    RenameKept(usize, String),
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
     /// Write all distributions.

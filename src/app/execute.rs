@@ -148,8 +148,8 @@ impl App {
             Command::CloseSheets => (interface.shortcuts, interface.tool) = (false, None),
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => self.set_as_kept(index),
-            Command::RenameKept(index) => {
-                if let Err(error) = self.library.history.rename(index) {
+            Command::RenameKept(index, name) => {
+                if let Err(error) = self.library.history.rename(index, &name) {
                     self.messages.error(error.to_string());
                 }
             }

@@ -86,13 +86,13 @@ impl History {
         kept.of_scene != self.of_scene
     }
 
-    /// Keeps a picture's new name for the next window.
+    /// Gives a picture another name, here and in its file.
     ///
     /// # Errors
     /// If it cannot be kept.
-    pub(crate) fn rename(&mut self, index: usize) -> Result<()> {
+    pub(crate) fn rename(&mut self, index: usize, name: &str) -> Result<()> {
         let Some(kept) = self.list.get_mut(index) else { return Ok(()) };
-        kept.name = kept.name.trim().to_owned();
+        kept.name = name.trim().to_owned();
         self.album.as_ref().map_or(Ok(()), |album| album.write_again(kept))
     }
 

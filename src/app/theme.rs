@@ -181,21 +181,34 @@ pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
     let mut chosen = *color;
     let id = ui.color_edit_button_rgb(&mut chosen).id.with("hex");
     let own = hex_of_color(Vec3::from(*color));
-    let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.clone());
     let font = FontId::proportional(12.0);
-    let field = ui.add(TextEdit::singleline(&mut text).desired_width(65.0).font(font));
-    if field.has_focus() {
-        ui.data_mut(|data| data.insert_temp(id, text));
-    } else {
-        ui.data_mut(|data| data.remove::<String>(id));
-        let typed = color_of_hex(&format!("#{}", text.trim().trim_start_matches('#')));
-        chosen = typed.ok().filter(|_| text != own).map_or(chosen, |typed| typed.to_array());
+    let (_, text) = text_field(ui, id, &own, |field| field.desired_width(65.0).font(font));
+    let hex = text.map(|text| format!("#{}", text.trim().trim_start_matches('#')));
+    if let Some(Ok(typed)) = hex.as_deref().map(color_of_hex) {
+        chosen = typed.to_array();
     }
     let is_another = hex_of_color(Vec3::from(chosen)) != own;
     if is_another {
         *color = chosen;
     }
     is_another
+}
+
+/// A field of text, styled by `style`, and what was typed into it once it is left, if that is not its `own` text.
+pub(super) fn text_field(
+    ui: &mut Ui,
+    id: egui::Id,
+    own: &str,
+    style: impl for<'t> FnOnce(TextEdit<'t>) -> TextEdit<'t>,
+) -> (Response, Option<String>) {
+    let mut text = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| own.to_owned());
+    let field = ui.add(style(TextEdit::singleline(&mut text)));
+    if field.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, text));
+        return (field, None);
+    }
+    ui.data_mut(|data| data.remove::<String>(id));
+    (field, Some(text).filter(|text| text != own))
 }
 
 /// A list to choose from, across the panel and as high as the window has room for.

@@ -38,15 +38,14 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &m
             }
             ui.vertical(|ui| {
                 ui.spacing_mut().item_spacing.y = 2.0;
-                let name = egui::TextEdit::singleline(&mut kept.name)
-                    .char_limit(MAX_NAME)
-                    .desired_width(ui.available_width())
-                    .frame(egui::Frame::NONE)
-                    .hint_text("Name");
-                let name = ui.add(name).on_hover_text("Click to write a name or a note");
-                if name.lost_focus() {
-                    commands.push(Command::RenameKept(i));
-                }
+                let id = Id::unique("name").with(Arc::as_ptr(&kept.pixels).addr());
+                let width = ui.available_width();
+                let (field, typed) = theme::text_field(ui, id, &kept.name, |field| {
+                    let field = field.char_limit(MAX_NAME).desired_width(width);
+                    field.frame(egui::Frame::NONE).hint_text("Name")
+                });
+                field.on_hover_text("Click to write a name or a note");
+                commands.extend(typed.map(|name| Command::RenameKept(i, name)));
                 ui.label(theme::quiet(&kept.summary));
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = 4.0;
