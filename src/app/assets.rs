@@ -26,7 +26,8 @@ struct TransformedMap {
 
 /// What is loaded.
 pub(super) struct Assets {
-    loader: Loader,
+    /// What reads files.
+    pub(super) loader: Loader,
     /// What looks at their files.
     pub(super) reload: Option<Reload>,
     /// The scene that is shown.
@@ -72,11 +73,6 @@ impl Assets {
     /// What is being loaded.
     pub(super) fn loading(&self) -> impl Iterator<Item = Loading<'_>> {
         self.loader.busy_with()
-    }
-
-    /// Gives up the scene or the map that is being loaded; whether there was one.
-    pub(super) fn stop_loading(&mut self, kind: Kind) -> bool {
-        self.loader.stop(kind)
     }
 
     /// What has been loaded since this was asked last and is still wanted.

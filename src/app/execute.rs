@@ -46,7 +46,7 @@ impl App {
             }
             Command::StopLoading => {
                 for kind in [Kind::Scene, Kind::Map] {
-                    if self.assets.stop_loading(kind) {
+                    if self.assets.loader.stop(kind) {
                         self.stay(kind, "loading was cancelled");
                     }
                 }

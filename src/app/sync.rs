@@ -126,11 +126,8 @@ impl App {
                 let shown = self.assets.map.as_ref();
                 let shown = shown.map(|map| (map.name.clone(), map.sun_factor));
                 // At the start there is none: the built-in one is always there.
-                let default = || {
-                    let Document { map, sun, .. } = Document::default();
-                    (map, sun)
-                };
-                let (map, sun) = shown.unwrap_or_else(default);
+                let Document { map, sun, .. } = Document::default();
+                let (map, sun) = shown.unwrap_or((map, sun));
                 self.edited.put_back(|document| (document.map, document.sun) = (map, sun));
             }
         }

@@ -39,9 +39,8 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &m
             ui.vertical(|ui| {
                 ui.spacing_mut().item_spacing.y = 2.0;
                 let id = Id::unique("name").with(Arc::as_ptr(&kept.pixels).addr());
-                let width = ui.available_width();
                 let (field, typed) = theme::text_field(ui, id, &kept.name, |field| {
-                    let field = field.char_limit(MAX_NAME).desired_width(width);
+                    let field = field.char_limit(MAX_NAME).desired_width(f32::INFINITY);
                     field.frame(egui::Frame::NONE).hint_text("Name")
                 });
                 field.on_hover_text("Click to write a name or a note");
