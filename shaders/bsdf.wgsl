@@ -10,6 +10,10 @@ struct Bsdf {
     rescatter: Rescatter,
     sheen: Sheen,
     coat: Coat,
+//#if SPLIT_LOBES
+    // Of the coat, of the interface with what its microfacets scatter more than once, and of the other lobes.
+    weights: vec3f,
+//#end
 }
 
 // What depends on `wo` alone. All probabilities are zero if nothing is scattered.
@@ -68,12 +72,22 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     b.rescatter = rescatter_new(p, b.interface_);
     b.sheen = sheen_new(p, entering);
     b.coat = coat_new(p, entering);
+//#if SPLIT_LOBES
+    b.weights = vec3f(1.0);
+//#end
     return b;
 }
 
 fn bsdf_is_delta_only(b: Bsdf) -> bool {
+//#if SPLIT_LOBES
+    let is_perfect = interface_is_delta_or_absent(b.interface_) && rescatter_is_absent(b.rescatter);
+    return (b.weights.z == 0.0 || (diffuse_is_absent(b.diffuse) && sheen_is_hidden(b.sheen)))
+        && (b.weights.y == 0.0 || is_perfect)
+        && (b.weights.x == 0.0 || coat_is_delta_or_absent(b.coat));
+//#else
     return diffuse_is_absent(b.diffuse) && rescatter_is_absent(b.rescatter)
         && interface_is_delta_or_absent(b.interface_) && sheen_is_hidden(b.sheen) && coat_is_delta_or_absent(b.coat);
+//#end
 }
 
 // What the interface lets in on average.
@@ -124,12 +138,19 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     let diffuse_left = bsdf_diffuse_left(b, terms);
     let under = coat_attenuation(b.coat, wo);
     let base = under * sheen_left(b.sheen, wo, wo);
-    let coat = coat_albedo(b.coat, wo);
-    let interface_share = base * importance(interface_albedo(b.interface_, wo.z, terms));
-    let sheen = under * importance(sheen_colored_albedo(b.sheen, wo));
-    let diffuse = base * diffuse_left * importance(diffuse_sum(b.diffuse));
+    var coat = coat_albedo(b.coat, wo);
+    var interface_share = base * importance(interface_albedo(b.interface_, wo.z, terms));
+    var sheen = under * importance(sheen_colored_albedo(b.sheen, wo));
+    var diffuse = base * diffuse_left * importance(diffuse_sum(b.diffuse));
     out.lost = rescatter_lost_or_none(b, wo);
-    let rescatter = base * importance(rescatter_sum(b.rescatter)) * out.lost;
+    var rescatter = base * importance(rescatter_sum(b.rescatter)) * out.lost;
+//#if SPLIT_LOBES
+    coat *= b.weights.x;
+    interface_share *= b.weights.y;
+    sheen *= b.weights.z;
+    diffuse *= b.weights.z;
+    rescatter *= b.weights.y;
+//#end
     let sum = coat + interface_share + sheen + rescatter + diffuse;
     if !(sum > 0.0) {
         return out;
@@ -156,7 +177,7 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         result.value += lobe.value;
         result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
     }
-    if !rescatter_is_absent(b.rescatter) {
+    if !rescatter_is_absent(b.rescatter) && out.rescatter_probability > 0.0 {
         let lobe = rescatter_eval_pdf(b.rescatter, b.interface_, out.lost, wi);
         result.value += lobe.value;
         result.pdf_solid_angle += out.rescatter_probability * lobe.pdf_solid_angle;
@@ -177,6 +198,9 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
             result.pdf_solid_angle += out.coat_probability * coat.y;
         }
     }
+//#if SPLIT_LOBES
+    result.value *= max_element(b.weights);
+//#end
     return result;
 }
 
@@ -234,6 +258,9 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         if lobe.kind == DELTA {
             weight *= bsdf_left_by_layers(b, wo, lobe.wi) / out.interface_probability;
         }
+//#if SPLIT_LOBES
+        weight *= max_element(b.weights);
+//#end
         if is_finite3(weight) {
             result = BsdfSample(lobe.wi, weight, 1.0, true);
         }
@@ -252,13 +279,23 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
 fn bsdf_albedo(b: Bsdf) -> vec3f {
     let up = vec3f(0.0, 0.0, 1.0);
     let terms = terms_towards(b.interface_.ggx, b.roughness, up);
-    let diffuse = diffuse_albedo(b.diffuse, b.interface_)
+    var diffuse = diffuse_albedo(b.diffuse, b.interface_)
         * (bsdf_diffuse_left(b, terms) * bsdf_let_in(b));
-    let interface_share = interface_albedo(b.interface_, 1.0, terms)
+    var interface_share = interface_albedo(b.interface_, 1.0, terms)
         + interface_straight_transmittance(b.interface_, 1.0);
-    let rescattered = rescatter_albedo(b.rescatter, b.interface_) * rescatter_lost_or_none(b, up);
+    var rescattered = rescatter_albedo(b.rescatter, b.interface_) * rescatter_lost_or_none(b, up);
+    var sheen = sheen_colored_albedo(b.sheen, up);
+    var coat = coat_albedo(b.coat, up);
+    var most = 1.0;
+//#if SPLIT_LOBES
+    coat *= b.weights.x;
+    interface_share *= b.weights.y;
+    diffuse *= b.weights.z;
+    rescattered *= b.weights.y;
+    sheen *= b.weights.z;
+    most = max_element(b.weights);
+//#end
     let base = (diffuse + interface_share + rescattered) * sheen_left(b.sheen, up, SHEEN_TYPICAL);
     let under = coat_attenuation(b.coat, up);
-    let under_coat = under * under * (sheen_colored_albedo(b.sheen, up) + base);
-    return saturate(coat_albedo(b.coat, up) + under_coat);
+    return clamp(coat + under * under * (sheen + base), vec3f(0.0), vec3f(most));
 }

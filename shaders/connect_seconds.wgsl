@@ -52,7 +52,8 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
         return vec4f(0.0);
     }
     if (what & 63u) != member {
-        if !is_in_medium && !is_true_from(batch[index].shading_frame.z, normal, -direction) {
+        if !is_in_medium
+            && !is_true_from(batch[index].shading_frame, batch[index].bsdf, normal, -direction) {
             return vec4f(0.0);
         }
         let origin = vertex_origin_toward(vertex, direction);
@@ -143,8 +144,11 @@ fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let wo = local_from_world(frame, direction);
     var out = bsdf_outgoing(bsdf, wo);
 //#if !SHEEN
-    radiance = batch[index].diffuse * out.diffuse_left;
-    if interface_is_absent(bsdf.interface_) && rescatter_is_absent(bsdf.rescatter) {
+    radiance = batch[index].diffuse * (out.diffuse_left * coat_attenuation(bsdf.coat, wo));
+//#if SPLIT_LOBES
+    radiance *= max_element(bsdf.weights);
+//#end
+    if out.coat_probability + out.interface_probability + out.rescatter_probability <= 0.0 {
         return radiance;
     }
     out.diffuse_probability = 0.0;
@@ -188,6 +192,9 @@ fn connect_seconds(
         path.ray.direction = float3(firsts[at + 192u]);
 //#end
         vertex = vertex_at(&path, hit, path.ray.direction);
+//#if SPLIT_LOBES
+        vertex.bsdf = broad_part_of_first(vertex.bsdf, vertex.wo);
+//#end
         path.sampler.pair = pair_in(hit.w, 2u);
         path.map_samples = f32(MAP_SAMPLES);
 //#if COUNTING
@@ -226,6 +233,9 @@ fn connect_seconds(
 //#end
                 batch[lane].shading_frame = point.shading_frame;
                 batch[lane].bsdf = bsdf_new(point.parameters, point.front_face);
+//#if SPLIT_LOBES
+                batch[lane].bsdf = broad_part_of_second(batch[lane].bsdf);
+//#end
 //#if !SHEEN
                 batch[lane].diffuse = diffuse_light_of(lane, second_at_);
 //#end

@@ -22,7 +22,7 @@ fn is_alike_nearby(vertex: Vertex) -> bool {
         return true;
     }
 //#end
-    return !refracts(vertex) && is_broad(vertex, MIN_ALPHA);
+    return !refracts(vertex) && is_broad(vertex, MIN_SHARED_ALPHA);
 }
 
 // The vertex that the path is at, as it is kept.
@@ -43,7 +43,7 @@ fn is_vertex_true_from(vertex: Vertex, to_viewer: vec3f) -> bool {
     }
 //#end
     return is_true_from(
-        vertex.point.shading_frame.z, vertex.point.geometric_normal, to_viewer);
+        vertex.point.shading_frame, vertex.bsdf, vertex.point.geometric_normal, to_viewer);
 }
 
 // At the first vertex: whether its light is gathered later, by `connect_seconds`.
@@ -91,8 +91,10 @@ fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
     var shares = (first[0].w & IS_SHARED) != 0u
         && (*path).is_clear
         && (*path).departure_pdf_solid_angle < F32_MAX
-        && is_alike_nearby(vertex)
-        && is_vertex_true_from(vertex, -(*path).ray.direction);
+        && is_alike_nearby(vertex);
+    if shares {
+        shares = is_vertex_true_from(vertex, -(*path).ray.direction);
+    }
 //#if LIFTED
     // Connections start from the triangle.
     shares = shares && dot(first_normal, (*path).ray.direction) >= 0.0;

@@ -1,11 +1,12 @@
 // Estimates what arrives at the second vertices that are kept, one estimate a lane.
 
-// Keeps a direction of light, and what an interface leaves of the light that the body below scatters.
+// Keeps a direction of light, and what coat and interface transmit of it to the body below.
 fn put_incident(at: u32, vertex: Vertex, direction: vec3f, light: vec3f, rays: u32) {
     var left = 0.0;
 //#if !SHEEN
     let wi = local_from_world(vertex.point.shading_frame, direction);
-    left = bsdf_diffuse_left_at(vertex.bsdf, select(-wi, wi, wi.z > 0.0));
+    left = bsdf_diffuse_left_at(vertex.bsdf, select(-wi, wi, wi.z > 0.0))
+        * coat_attenuation(vertex.bsdf.coat, wi);
 //#end
     seconds[at] = packed(direction, bitcast<u32>(left));
     put_light(at, light, rays);
@@ -94,7 +95,10 @@ fn begin_estimate(group: u32, lane: u32) {
 //#if COUNTING
     path.is_counted = (hit.w & IS_COUNTED_SECOND) != 0u;
 //#end
-    let vertex = vertex_at(&path, hit, direction);
+    var vertex = vertex_at(&path, hit, direction);
+//#if SPLIT_LOBES
+    vertex.bsdf = broad_part_of_second(vertex.bsdf);
+//#end
     var put_at = at + 2u + 2u * INCIDENTS * estimate;
 //#if MAP_SAMPLING
     let of_map = light_of_map(&path, vertex, path_pair_bits(&path));

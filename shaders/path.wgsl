@@ -258,6 +258,9 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     vertex.point = point;
     vertex.bsdf = bsdf;
     vertex.wo = local_from_world(point.shading_frame, -(*path).ray.direction);
+//#if SPLIT_LOBES
+    vertex.bsdf = split(path, vertex);
+//#end
     vertex.distribution = WHOLE_MAP;
 //#if LIGHT_GRID
     vertex.cell = cell_of(point.position, point.geometric_normal);
@@ -382,6 +385,12 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 fn is_perfect_interface(vertex: Vertex) -> bool {
 //#if MEDIUM
     if vertex.is_in_medium {
+        return false;
+    }
+//#end
+//#if SPLIT_LOBES
+    // The narrow lobes of a surface that has others, too, are none.
+    if vertex.bsdf.weights.z == 0.0 {
         return false;
     }
 //#end

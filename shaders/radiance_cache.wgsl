@@ -50,6 +50,15 @@ fn find_cached(key: CacheKey) -> vec4u {
     return vec4u(0u);
 }
 
+// What radiance is divided by in the cache.
+fn cached_albedo(vertex: Vertex) -> vec3f {
+//#if SPLIT_LOBES
+    return bsdf_albedo_towards(vertex.bsdf, vertex.wo);
+//#else
+    return bsdf_albedo(vertex.bsdf);
+//#end
+}
+
 fn cached_radiance_over_albedo(position: vec3f, normal: vec3f) -> vec3f {
     let cell = cache_cell(position, normal);
     var slot = find_cached(cache_key(cell));
@@ -72,20 +81,30 @@ fn ends_in_cache(path: ptr<function, Path>, vertex: Vertex) -> bool {
     }
 //#end
     let normal = vertex.point.geometric_normal;
-    let pdf = (*path).departure_pdf_solid_angle;
-    if pdf < F32_MAX {
-        let cosine = abs(dot(normal, (*path).ray.direction));
-        (*path).spread += (*path).travelled / sqrt(pdf * cosine);
-    }
     let position = vertex.point.position;
-    let is_known = (*path).spread >= cache_edge(cache_level(position))
-        && is_in_air(path)
+    let ends = is_known(path, vertex.point) && is_in_air(path)
         && !transmits(vertex) && is_broad(vertex, MIN_CACHED_ALPHA);
-    if is_known {
+    (*path).spread = spread_at(path, normal);
+    if ends {
         (*path).radiance += (*path).throughput
-            * bsdf_albedo(vertex.bsdf)
+            * cached_albedo(vertex)
             * cached_radiance_over_albedo(position, normal);
     }
-    return is_known;
+    return ends;
+}
+
+// How wide the path spreads where it has arrived.
+fn spread_at(path: ptr<function, Path>, normal: vec3f) -> f32 {
+    let pdf = (*path).departure_pdf_solid_angle;
+    if pdf >= F32_MAX {
+        return (*path).spread;
+    }
+    return (*path).spread + (*path).travelled / sqrt(pdf * abs(dot(normal, (*path).ray.direction)));
+}
+
+// Twin of `cached::is_known`, but for `is_in_air`.
+fn is_known(path: ptr<function, Path>, point: SurfacePoint) -> bool {
+    return globals.cache_is_known != 0u
+        && spread_at(path, point.geometric_normal) >= cache_edge(cache_level(point.position));
 }
 //#end

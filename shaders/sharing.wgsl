@@ -156,7 +156,18 @@ fn vertex_at(path: ptr<function, Path>, hit: vec4u, direction: vec3f) -> Vertex 
 }
 
 // Twin of `SurfaceScatterer::is_true_from`.
-fn is_true_from(normal: vec3f, geometric_normal: vec3f, to_viewer: vec3f) -> bool {
+fn is_true_from(frame: Frame, b: Bsdf, geometric_normal: vec3f, to_viewer: vec3f) -> bool {
+    var is_true = is_normal_true_from(frame.z, geometric_normal, to_viewer);
+//#if CLEARCOAT
+    if is_true && !coat_is_absent(b.coat) {
+        let coat_normal = world_from_local(frame, b.coat.frame.z);
+        is_true = is_normal_true_from(coat_normal, geometric_normal, to_viewer);
+    }
+//#end
+    return is_true;
+}
+
+fn is_normal_true_from(normal: vec3f, geometric_normal: vec3f, to_viewer: vec3f) -> bool {
     let geometric_cosine = dot(geometric_normal, to_viewer);
     let cosine = dot(normal, to_viewer);
     let mirrored = 2.0 * cosine * dot(normal, geometric_normal) - geometric_cosine;

@@ -64,7 +64,15 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
         return trained;
     }
     let words = slot * CACHE_WORDS;
-    let albedo = bsdf_albedo(vertex.bsdf);
+    var albedo = cached_albedo(vertex);
+//#if SPLIT_LOBES
+    // Parts of BSDFs have weights, which would bring their albedo above 1.
+    let weight = max_element(vertex.bsdf.weights);
+    albedo /= weight;
+    trained.throughput = throughput * weight;
+//#else
+    trained.throughput = throughput;
+//#end
     atomicStore(&cache_sums[words + 1u], parent + 1u);
     atomicAdd(&cache_sums[words + 2u], 1u);
     let bits = dice(position);
@@ -81,7 +89,6 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
         }
     }
     trained.slot = slot;
-    trained.throughput = throughput;
     trained.radiance_before = (*path).radiance;
     return trained;
 }

@@ -49,6 +49,15 @@ impl Coat {
         self.strength == 0.0
     }
 
+    /// Unit, in the local frame.
+    pub(super) fn normal(&self) -> Vec3 {
+        self.frame.z
+    }
+
+    pub(super) fn alpha(&self) -> f32 {
+        self.ggx.alpha()
+    }
+
     pub(super) fn is_delta_or_absent(&self) -> bool {
         self.is_absent() || !self.is_outside(1.0) || self.ggx.is_smooth()
     }

@@ -22,6 +22,7 @@ mod diffuse;
 pub(crate) mod fresnel;
 pub(crate) mod interface;
 pub(crate) mod iridescence;
+pub(crate) mod lobes;
 pub(crate) mod microfacet;
 pub(crate) mod rescatter;
 pub(crate) mod sheen;
@@ -36,6 +37,7 @@ use coat::Coat;
 use diffuse::Diffuse;
 use fresnel::normal_reflectance;
 use interface::Interface;
+use lobes::{LobeWeights, MAX_NARROW_PROBABILITY, MAX_NARROW_SHARE};
 use rescatter::Rescatter;
 use sheen::Sheen;
 
@@ -96,6 +98,8 @@ pub struct Bsdf {
     coat: Coat,
     /// There is nothing but Lambert's reflection: what most walls are, and cheap.
     is_lambert: bool,
+    /// Which part of it this is.
+    weights: LobeWeights,
 }
 
 /// The scattering towards one direction: what depends on that alone is known.
@@ -136,7 +140,7 @@ impl Bsdf {
         let (sheen, coat) = (Sheen::new(p, entering), Coat::new(p, entering));
         let is_lambert =
             diffuse.is_lambert() && interface.is_absent() && sheen.is_absent() && coat.is_absent();
-        Self { interface, diffuse, rescatter, sheen, coat, is_lambert }
+        Self { interface, diffuse, rescatter, sheen, coat, is_lambert, weights: LobeWeights::ALL }
     }
 
     /// The same for a path of which one channel stands for all if a dispersive solid refracts it.
@@ -178,10 +182,67 @@ impl Bsdf {
         self.is_lambert
     }
 
-    /// Whether there is no coat, and reflections are no narrower than GGX makes them with this alpha.
-    pub(crate) fn is_broad(&self, least_alpha: f32) -> bool {
-        self.coat.is_absent()
-            && (self.interface.is_absent() || self.interface.ggx().alpha() >= least_alpha)
+    /// Whether reflections are no narrower than GGX makes them with this alpha.
+    pub(crate) fn is_broad(&self, min_alpha: f32) -> bool {
+        self.narrow_lobes(min_alpha) == [false; 2]
+    }
+
+    /// Whether coat and interface are narrower than GGX makes them with this alpha.
+    fn narrow_lobes(&self, min_alpha: f32) -> [bool; 2] {
+        let Self { coat, interface, weights, .. } = self;
+        [
+            weights.coat > 0.0 && !coat.is_absent() && coat.alpha() < min_alpha,
+            weights.interface > 0.0
+                && !interface.is_absent()
+                && interface.ggx().alpha() < min_alpha,
+        ]
+    }
+
+    /// Its narrow or its broad lobes, divided by the probability of that part; `None` if it does not have both. The
+    /// narrow part has the probability of its share of the albedo towards the unit local direction `wo`, or this
+    /// minimum. `u` draws a uniform number.
+    pub(crate) fn split(
+        &self,
+        min_alpha: f32,
+        (wo, min_probability): (Vec3, f32),
+        u: impl FnOnce() -> f32,
+    ) -> Option<Self> {
+        let narrow @ [coat, interface] = self.narrow_lobes(min_alpha);
+        let out = self.outgoing(wo).filter(|_| coat || interface)?;
+        let by_interface = out.interface_probability + out.rescatter_probability;
+        let share = f32::from(coat) * out.coat_probability + f32::from(interface) * by_interface;
+        (share > 0.0 && share <= MAX_NARROW_SHARE).then(|| {
+            let probability = share.clamp(min_probability, MAX_NARROW_PROBABILITY);
+            Self { weights: LobeWeights::of_part(narrow, probability, u()), ..*self }
+        })
+    }
+
+    /// The factor of a part: 1 over its probability.
+    pub(crate) fn weight(&self) -> f32 {
+        self.weights.max()
+    }
+
+    /// Whether only the body scatters: then the BSDF is [`Self::left`] of one direction times a function of the other.
+    pub(crate) fn is_body_only(&self) -> bool {
+        let Self { interface, rescatter, weights, .. } = self;
+        (weights.interface == 0.0 || interface.is_absent() && rescatter.is_none())
+            && (weights.coat == 0.0 || self.coat.is_absent())
+            && self.sheen.is_absent()
+    }
+
+    /// Share of the body's light that coat and interface transmit in the unit local direction `v`, in `[0,1]`.
+    pub(crate) fn left(&self, v: Vec3) -> f32 {
+        self.coat.attenuation(v) * self.diffuse.left(v)
+    }
+
+    /// The coat's local normal, if there is a coat.
+    pub(crate) fn coat_normal(&self) -> Option<Vec3> {
+        (!self.coat.is_absent()).then(|| self.coat.normal())
+    }
+
+    /// Whether next event estimation can find light: not for a part that only reflects perfectly.
+    pub(crate) fn gathers(&self) -> bool {
+        self.weights.others > 0.0 || !self.is_delta_only()
     }
 
     /// Light that goes straight through: smooth thin-walled transmission, tinted by the base colour.
@@ -201,15 +262,14 @@ impl Bsdf {
     /// Whether all scattering is perfect reflection or refraction (or there is none), so that
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
-        self.diffuse.is_absent()
-            && self.rescatter.is_none()
-            && self.interface.is_delta_or_absent()
-            && self.sheen.is_hidden()
-            && self.coat.is_delta_or_absent()
+        let Self { interface, rescatter, weights, .. } = self;
+        (weights.others == 0.0 || self.diffuse.is_absent() && self.sheen.is_hidden())
+            && (weights.interface == 0.0 || interface.is_delta_or_absent() && rescatter.is_none())
+            && (weights.coat == 0.0 || self.coat.is_delta_or_absent())
     }
 
-    /// Share of uniform light from everywhere that reaches a viewer straight above, in `[0,1]`;
-    /// an estimate for guide layers of denoisers.
+    /// Share of uniform light from everywhere that reaches a viewer straight above, at least 0 and at most
+    /// [`Self::weight`], which is 1 of a whole BSDF; an estimate for guide layers of denoisers.
     pub fn albedo(&self) -> Vec3 {
         let up = Vec3::Z;
         let terms = self.diffuse.terms_at(up);
@@ -219,10 +279,13 @@ impl Bsdf {
             self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
         let rescattered = self.rescatter.as_ref();
         let rescattered = rescattered.map_or(Vec3::ZERO, |lobe| lobe.albedo(lobe.lost(up), scale));
-        let base = self.sheen.left(up, Sheen::TYPICAL) * (diffuse + interface + rescattered);
+        let LobeWeights { others, .. } = self.weights;
+        let base = (interface + rescattered) * self.weights.interface + diffuse * others;
+        let base = self.sheen.left(up, Sheen::TYPICAL) * base;
         let under = self.coat.attenuation(up);
-        let under = under * under * (self.sheen.colored_albedo(up) + base);
-        (self.coat.albedo(up) + under).clamp(Vec3::ZERO, Vec3::ONE)
+        let under = under * under * (self.sheen.colored_albedo(up) * others + base);
+        let albedo = self.coat.albedo(up) * self.weights.coat + under;
+        albedo.clamp(Vec3::ZERO, Vec3::splat(self.weights.max()))
     }
 
     fn eval_pdf_with(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> (Vec3, f32) {
@@ -237,7 +300,9 @@ impl Bsdf {
             value += interface;
             pdf += out.interface_probability * interface_pdf;
         }
-        if let Some(rescatter) = &self.rescatter {
+        if let Some(rescatter) = &self.rescatter
+            && out.rescatter_probability > 0.0
+        {
             let (rescattered, rescatter_pdf) = rescatter.eval_pdf(out.lost, wi);
             value += rescattered;
             pdf += out.rescatter_probability * rescatter_pdf;
@@ -250,16 +315,15 @@ impl Bsdf {
                 pdf += out.sheen_probability * sheen_pdf;
             }
         }
-        if self.coat.is_absent() {
-            return (value, pdf);
+        if !self.coat.is_absent() {
+            value *= self.coat.attenuation(wo) * self.coat.attenuation(wi);
+            if out.coat_probability > 0.0 {
+                let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
+                value += Vec3::splat(coat);
+                pdf += out.coat_probability * coat_pdf;
+            }
         }
-        value *= self.coat.attenuation(wo) * self.coat.attenuation(wi);
-        if out.coat_probability > 0.0 {
-            let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
-            value += Vec3::splat(coat);
-            pdf += out.coat_probability * coat_pdf;
-        }
-        (value, pdf)
+        (value * self.weights.max(), pdf)
     }
 
     /// What coat and sheen leave of the base's light between two directions.
@@ -291,10 +355,12 @@ impl Bsdf {
         let diffuse_left = self.diffuse.left_of(terms);
         let under = self.coat.attenuation(wo);
         let base = under * self.sheen.left(wo, wo);
-        let coat = self.coat.albedo(wo);
+        let weights = self.weights;
+        let coat = weights.coat * self.coat.albedo(wo);
+        let sheen = weights.others * under * importance(self.sheen.colored_albedo(wo));
+        let diffuse = weights.others * base * diffuse_left * self.diffuse.importance();
+        let base = weights.interface * base;
         let interface = base * importance(self.interface.albedo(wo.z, terms));
-        let sheen = under * importance(self.sheen.colored_albedo(wo));
-        let diffuse = base * diffuse_left * self.diffuse.importance();
         let lost = self.rescatter.as_ref().map_or(0.0, |rescatter| rescatter.lost(wo));
         let rescatter = self.rescatter.as_ref().map_or(0.0, |r| base * r.importance(lost));
         let sum = coat + interface + sheen + rescatter + diffuse;
@@ -319,6 +385,18 @@ impl<'a> ViewedBsdf<'a> {
     /// Shares of light that its interface, if it is smooth, reflects and transmits, linear RGB in `[0,1]`.
     pub(crate) fn smooth_shares(&self) -> [Vec3; 2] {
         self.bsdf.interface.smooth_shares(self.wo.z.abs())
+    }
+
+    /// Albedo towards the viewer: [`Bsdf::albedo`], scaled by what absent layers transmit towards the viewer relative
+    /// to the normal.
+    pub(crate) fn albedo(&self) -> Vec3 {
+        let Bsdf { weights, coat, diffuse, .. } = self.bsdf;
+        let transmitted = |v: Vec3| {
+            let by_coat = if weights.coat == 0.0 { coat.attenuation(v) } else { 1.0 };
+            by_coat * if weights.interface == 0.0 { diffuse.left(v) } else { 1.0 }
+        };
+        let up = transmitted(Vec3::Z);
+        if up > 0.0 { self.bsdf.albedo() * (transmitted(self.wo) / up) } else { Vec3::ZERO }
     }
 
     /// See [`Bsdf::eval`].
@@ -369,9 +447,9 @@ impl<'a> ViewedBsdf<'a> {
         };
         match lobe {
             LobeSample::Spread(wi) => spread_sample(wi, bsdf.eval_pdf_with(wo, wi, &out)),
-            LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
+            LobeSample::Coat(wi, weight) => delta_sample(wi, weight * bsdf.weights.max()),
             LobeSample::Interface(wi, weight) => {
-                let left = bsdf.left_by_layers(wo, wi);
+                let left = bsdf.weights.max() * bsdf.left_by_layers(wo, wi);
                 delta_sample(wi, weight * (left / out.interface_probability))
             }
         }

@@ -1,15 +1,16 @@
 //! Where a path may end: in what the radiance cache knows of a surface.
 
-use super::Path;
-use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
+use glam::Vec3;
 
-/// Least GGX alpha of a surface that sends back much the same to all sides.
-pub(crate) const MIN_ALPHA: f32 = 0.05;
+use super::Path;
+use super::splitting::MIN_CACHED_ALPHA;
+use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
+use crate::radiance_cache::RadianceCache;
 
 impl SurfaceScatterer<'_> {
     /// Whether what it sends back may be kept in a cache.
     pub(super) fn is_cacheable(&self) -> bool {
-        !self.transmits && self.bsdf().is_broad(MIN_ALPHA)
+        !self.transmits && self.bsdf().is_broad(MIN_CACHED_ALPHA)
     }
 }
 
@@ -25,28 +26,38 @@ impl Path<'_> {
         if self.bounces == 0 || self.bounces == self.tracer.limits.bounces {
             return false;
         }
-        self.widen(vertex);
         let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
-        let is_known = self.spread >= cache.cells().edge_at(vertex.position)
-            && self.is_in_air()
-            && surface.is_cacheable();
+        let (position, normal) = (vertex.position, surface.sides.geometric_normal);
+        let is_known = self.is_known(position, normal) && surface.is_cacheable();
+        self.widen(vertex);
         if is_known {
-            let radiance =
-                cache.radiance_over_albedo(vertex.position, surface.sides.geometric_normal);
-            self.radiance += self.throughput * surface.bsdf().albedo() * radiance;
+            let radiance = cache.radiance_over_albedo(position, normal);
+            self.radiance += self.throughput * surface.bsdf.albedo() * radiance;
         }
         is_known
     }
 
+    /// Whether the cache knows what the path would find from a surface that it has arrived at.
+    pub(super) fn is_known(&self, position: Vec3, normal: Vec3) -> bool {
+        let is_wide =
+            |cache: &RadianceCache| spread_at(self, normal) >= cache.cells().edge_at(position);
+        self.is_in_air() && self.tracer.cache.is_some_and(is_wide)
+    }
+
     /// Spreads the path over the way to where it has arrived, if anybody asks.
     pub(super) fn widen(&mut self, vertex: &Vertex<'_>) {
-        if self.tracer.cache.is_none() || self.bounces == 0 {
-            return;
-        }
-        if let Scatterer::Surface(surface) = &vertex.scatterer {
-            let cosine = surface.sides.geometric_normal.dot(self.ray.direction).abs();
-            // Of perfect reflections the density is infinite.
-            self.spread += self.travelled / (self.departure.pdf_solid_angle * cosine).sqrt();
+        if self.tracer.cache.is_some()
+            && self.bounces > 0
+            && let Scatterer::Surface(surface) = &vertex.scatterer
+        {
+            self.spread = spread_at(self, surface.sides.geometric_normal);
         }
     }
+}
+
+/// How wide the path spreads where it has arrived, in metres, on a surface with this geometric normal.
+fn spread_at(path: &Path<'_>, normal: Vec3) -> f32 {
+    let cosine = normal.dot(path.ray.direction).abs();
+    // Of perfect reflections the density is infinite.
+    path.spread + path.travelled / (path.departure.pdf_solid_angle * cosine).sqrt()
 }

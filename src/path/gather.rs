@@ -21,13 +21,6 @@ pub(super) struct ChosenLights {
 }
 
 impl Path<'_> {
-    /// Next event estimation from the map and, if there are any, one local light.
-    pub(super) fn gather(&mut self, vertex: &Vertex<'_>, lights: &ChosenLights) {
-        let mut sum = Vec3::ZERO;
-        self.for_arriving(vertex, lights, |arriving| sum += arriving.f * arriving.light);
-        self.radiance += self.throughput * sum;
-    }
-
     /// Draws the random numbers of next event estimation, and chooses tiles of the map by them.
     #[inline(always)]
     pub(super) fn choose_lights(&mut self, vertex: &Vertex<'_>) -> ChosenLights {
@@ -51,7 +44,7 @@ impl Path<'_> {
         chosen
     }
 
-    /// Calls `take` with the light that next event estimation finds.
+    /// Calls `take` with the light that next event estimation finds, of the map and, if there are any, of one local light.
     pub(super) fn for_arriving(
         &mut self,
         vertex: &Vertex<'_>,

@@ -28,6 +28,7 @@ mod materials;
 mod ray_clock;
 mod shadows;
 pub mod sharing;
+pub(crate) mod splitting;
 pub(crate) mod train;
 mod vertex;
 mod world;
@@ -46,6 +47,7 @@ pub use world_builder::WorldBuilder;
 
 use self::body::Body;
 use self::looks::Looks;
+use self::splitting::{MIN_NARROW, MIN_SHARED_NARROW, UseOfVertices};
 use self::vertex::{MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
@@ -191,6 +193,7 @@ struct Path<'a> {
     map_samples: u32,
     rays: u32,
     looks: Looks,
+    use_of_vertices: UseOfVertices,
 }
 
 impl<'a> Path<'a> {
@@ -221,6 +224,7 @@ impl<'a> Path<'a> {
             map_samples: 1,
             rays: 0,
             looks: Looks::default(),
+            use_of_vertices: UseOfVertices::alone(tracer.cache.is_some()),
         }
     }
 
@@ -241,10 +245,13 @@ impl<'a> Path<'a> {
         if !self.counts_vertex() {
             return false;
         }
-        let lights = self.choose_lights(vertex);
+        let gathers = vertex.scatterer.gathers();
+        let lights = gathers.then(|| self.choose_lights(vertex)).unwrap_or_default();
         // Meanwhile memory is fetched.
         let onward = self.choose_onward(vertex);
-        self.gather(vertex, &lights);
+        let mut gathered = Vec3::ZERO;
+        self.for_arriving(vertex, &lights, |arriving| gathered += arriving.f * arriving.light);
+        self.radiance += self.throughput * gathered;
         onward.is_some_and(|onward| self.go_on(vertex, &onward)) && self.survives()
     }
 
@@ -291,9 +298,11 @@ impl<'a> Path<'a> {
                 Some(Arrival::AtSurface(ref point)) => {
                     let bsdf = self.bsdf_at(point)?;
                     if !bsdf.is_delta_only() {
-                        let bsdf = match bsdf {
-                            Cow::Borrowed(ready) => ready,
-                            Cow::Owned(own) => own_bsdf.insert(own),
+                        let part = self.part_of(point, &bsdf);
+                        let bsdf = match (part, bsdf) {
+                            (Some(part), _) => own_bsdf.insert(part),
+                            (None, Cow::Borrowed(ready)) => ready,
+                            (None, Cow::Owned(own)) => own_bsdf.insert(own),
                         };
                         return Some(self.vertex_at(point, bsdf));
                     }
@@ -304,6 +313,27 @@ impl<'a> Path<'a> {
                 }
             }
         }
+    }
+
+    /// The narrow or the broad lobes of a BSDF, if only the broad ones are of use there beside the path itself.
+    fn part_of(&mut self, point: &SurfacePoint<'_>, bsdf: &Bsdf) -> Option<Bsdf> {
+        let uses = self.use_of_vertices;
+        let min_alpha = uses.min_alpha(self.bounces)?;
+        let (parameters, is_cached) = (&point.parameters, matches!(uses, UseOfVertices::Cached));
+        if bsdf.is_broad(min_alpha)
+            || parameters.transmission > 0.0
+            || parameters.diffuse_transmission > 0.0
+            || !self.is_in_air()
+            || is_cached && !self.is_known(point.position, point.geometric_normal)
+        {
+            return None;
+        }
+        let choice = match uses {
+            // The probability must not depend on the pixel that finds the vertex: it is left out of the density.
+            UseOfVertices::Shared if self.bounces == 1 => (Vec3::Z, MIN_SHARED_NARROW),
+            _ => (point.shading_frame.local_from_world(-self.ray.direction), MIN_NARROW),
+        };
+        bsdf.split(min_alpha, choice, || self.sampler.next_pair()[0])
     }
 
     /// Goes on from a perfect interface; `false` if the path ends.
@@ -565,21 +595,17 @@ impl<'a> Path<'a> {
             self.ray = Ray { origin, direction: onward.direction, ..self.ray };
             return true;
         }
-        self.depart(vertex, origin, onward.direction, onward.pdf_solid_angle);
-        true
-    }
-
-    fn depart(&mut self, vertex: &Vertex<'_>, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
-        self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+        self.ray = Ray { origin, direction: onward.direction, t_min: 0.0, t_max: f32::INFINITY };
         self.departure = Departure {
             ray: self.ray,
-            pdf_solid_angle,
+            pdf_solid_angle: onward.pdf_solid_angle,
             receiver: vertex.receiver(),
             distribution: vertex.distribution,
             map_samples: self.map_samples,
             is_refracted: false,
         };
         self.map_samples = 1;
+        true
     }
 
     /// Russian roulette.

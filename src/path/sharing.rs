@@ -11,11 +11,15 @@
 //! are weighted by the sum of that over the tile, so each gets the integral it would get alone. That
 //! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for
 //! all pixels; whatever does not goes on as a path of its own.
+//!
+//! Of a varnished surface only the broad lobes are shared ([`super::splitting`]). Their probability at y is the same for
+//! all pixels: the weight of the part cancels it, so it is not in the density.
 
 use std::ops::Range;
 
 use glam::Vec3;
 
+use super::splitting::{MIN_SHARED_ALPHA, UseOfVertices};
 use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
 use super::{Path, PathResult, PathTracer, SHADOW_RAY_SHARE};
 use crate::bsdf::Bsdf;
@@ -73,9 +77,6 @@ pub struct Start<'a> {
     pub tracer: &'a PathTracer<'a>,
 }
 
-/// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
-pub(crate) const MIN_ALPHA: f32 = 0.01;
-
 /// A normal is seen as it is where the viewer's cosine with it is at least this share of that with the geometric
 /// normal: beyond where bending begins, so that what is bent is not taken for true.
 pub(crate) const TRUE_COSINE_SHARE: f32 = 0.1;
@@ -112,6 +113,8 @@ struct Incident {
 enum Outgoing<'v> {
     /// The same everywhere.
     Lambert(Vec3),
+    /// Of a body, before layers take a part of it by direction.
+    Body(&'v SurfaceScatterer<'v>, Vec3),
     Directed(&'v SurfaceScatterer<'v>, Vec<Incident>),
     InMedium(Phase, Vec<Incident>),
 }
@@ -126,11 +129,14 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
     let mut results = Vec::with_capacity(starts.len());
     for (owner, (start, [first_bsdf, second_bsdf])) in starts.iter().zip(&mut bsdfs).enumerate() {
         let mut path = Path::new(start.tracer, start.ray, start.sampler.clone());
+        path.use_of_vertices = UseOfVertices::Shared;
         let mut first = None;
         if let Some(vertex) = path.next_vertex(first_bsdf) {
             let shares = path.is_in_air() && vertex.scatterer.is_alike_nearby();
             if shares {
                 path.map_samples = tile.map_samples;
+            } else {
+                path.use_of_vertices = UseOfVertices::alone(start.tracer.cache.is_some());
             }
             let throughput = path.throughput;
             if path.visit(&vertex)
@@ -219,7 +225,9 @@ impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
         match self {
-            Self::Surface(surface) => !surface.refracts && surface.bsdf().is_broad(MIN_ALPHA),
+            Self::Surface(surface) => {
+                !surface.refracts && surface.bsdf().is_broad(MIN_SHARED_ALPHA)
+            }
             Self::Medium(_) => true,
         }
     }
@@ -246,16 +254,20 @@ impl Path<'_> {
 }
 
 impl SurfaceScatterer<'_> {
-    /// Whether a viewer in this direction sees the normal as it is, not bent into sight
+    /// Whether a viewer in this direction sees its normals as they are, not bent into sight
     /// ([`crate::scene::surface::SurfacePoint`]).
     fn is_true_from(&self, to_viewer: Vec3) -> bool {
-        let (normal, geometric) = (self.shading_frame.z, self.sides.geometric_normal);
+        let geometric = self.sides.geometric_normal;
         let geometric_cos = geometric.dot(to_viewer);
-        let cos = normal.dot(to_viewer);
-        let mirrored = 2.0 * cos * normal.dot(geometric) - geometric_cos;
-        geometric_cos > 0.0
-            && cos >= TRUE_COSINE_SHARE * geometric_cos
-            && mirrored >= (TRUE_MIRROR_SHARE * geometric_cos).min(TRUE_MIRROR_COSINE)
+        let is_true = |normal: Vec3| {
+            let cos = normal.dot(to_viewer);
+            let mirrored = 2.0 * cos * normal.dot(geometric) - geometric_cos;
+            geometric_cos > 0.0
+                && cos >= TRUE_COSINE_SHARE * geometric_cos
+                && mirrored >= (TRUE_MIRROR_SHARE * geometric_cos).min(TRUE_MIRROR_COSINE)
+        };
+        let coat = self.bsdf().coat_normal().map(|n| self.shading_frame.world_from_local(n));
+        is_true(self.shading_frame.z) && coat.is_none_or(is_true)
     }
 }
 
@@ -365,18 +377,27 @@ impl<'v> Outgoing<'v> {
             Scatterer::Surface(surface) => surface,
         };
         let bsdf = surface.bsdf();
-        if !bsdf.is_lambert() {
+        if !bsdf.is_body_only() {
             return Self::Directed(surface, incident);
         }
         let upward = bsdf.viewed_from(Vec3::Z);
         let reflected = |i: &Incident| upward.eval(i.wi) * i.light;
-        Self::Lambert(incident.iter().map(reflected).sum())
+        let radiance: Vec3 = incident.iter().map(reflected).sum();
+        match bsdf.left(Vec3::Z) {
+            _ if bsdf.is_lambert() => Self::Lambert(radiance),
+            left if left > 0.0 => Self::Body(surface, radiance / left),
+            _ => Self::Directed(surface, incident),
+        }
     }
 
     /// Radiance towards a world direction.
     fn radiance(&self, direction: Vec3) -> Vec3 {
         match self {
             Self::Lambert(radiance) => *radiance,
+            Self::Body(surface, radiance) => {
+                let wo = surface.shading_frame.local_from_world(direction);
+                if wo.z > 0.0 { *radiance * surface.bsdf().left(wo) } else { Vec3::ZERO }
+            }
             Self::Directed(surface, incident) => {
                 let wo = surface.shading_frame.local_from_world(direction);
                 let viewed = surface.bsdf().viewed_from(wo);

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::splitting::UseOfVertices;
 use super::vertex::{Scatterer, Vertex};
 use super::{Path, PathLimits, PathTracer};
 use crate::bvh::Ray;
@@ -38,6 +39,7 @@ impl PathTracer<'_> {
         let limits = PathLimits { bounces: window + TRAINING_VERTICES - 1, ..self.limits };
         let tracer = PathTracer { limits, cache: None, counts: None, ..*self };
         let mut path = Path::new(&tracer, ray, sampler);
+        path.use_of_vertices = UseOfVertices::Training(TRAINING_VERTICES);
         let mut training_vertices: Vec<TrainingVertex> =
             Vec::with_capacity(TRAINING_VERTICES as usize);
         let mut own_bsdf = None;
@@ -66,12 +68,14 @@ impl TrainingVertex {
             && path.is_in_air()
             && surface.is_cacheable()
             && throughput.min_element() > MIN_SHARE * throughput.max_element();
+        // Parts of BSDFs have weights, which would bring their albedo above 1.
+        let weight = surface.bsdf().weight();
         trains.then(|| Self {
             vertex: path.bounces,
             position: vertex.position,
             normal: surface.sides.geometric_normal,
-            albedo: surface.bsdf().albedo(),
-            throughput,
+            albedo: surface.bsdf.albedo() / weight,
+            throughput: throughput * weight,
             radiance_before: path.radiance,
         })
     }

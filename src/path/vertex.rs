@@ -81,6 +81,14 @@ impl Scatterer<'_> {
         }
     }
 
+    /// Whether next event estimation can find light.
+    pub(super) fn gathers(&self) -> bool {
+        match self {
+            Self::Surface(surface) => surface.bsdf().gathers(),
+            Self::Medium(_) => true,
+        }
+    }
+
     /// Whether rays in this direction do not start from the vertex itself ([`Sides::lifts`]).
     pub(super) fn lifts(&self, direction: Vec3) -> bool {
         match self {

@@ -74,6 +74,8 @@ pub enum TextureSlot {
 const MAX_SMOOTH_ROUGHNESS: f32 = 0.03;
 /// Roughness from which none are.
 const MIN_ROUGHNESS: f32 = 0.035;
+/// Roughness from which no reflection is too narrow to be shared or cached.
+pub(crate) const MAX_POLISH_ROUGHNESS: f32 = 0.2237;
 
 with_defaults! {
     /// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
@@ -197,6 +199,27 @@ impl Material {
     pub(crate) fn may_be_smooth(&self) -> bool {
         let varies = self.texture(TextureSlot::MetallicRoughness).is_some();
         !self.unlit && (varies || self.roughness < MIN_ROUGHNESS)
+    }
+
+    /// Whether it may have narrow reflections beside broad ones: a roughness below [`MAX_POLISH_ROUGHNESS`].
+    pub(crate) fn may_be_polished(&self) -> bool {
+        let may_be_narrow =
+            |roughness: f32, slot| roughness < MAX_POLISH_ROUGHNESS || self.texture(slot).is_some();
+        let may_be_opaque =
+            |transmission: f32, slot| transmission == 0.0 || self.texture(slot).is_some();
+        let is_coated = self.clearcoat > 0.0;
+        let is_pure_metal = self.metallic == 1.0
+            && self.texture(TextureSlot::MetallicRoughness).is_none()
+            && self.sheen_color == Vec3::ZERO
+            && !is_coated;
+        let is_polished = !is_pure_metal
+            && may_be_narrow(self.roughness, TextureSlot::MetallicRoughness)
+            || is_coated
+                && may_be_narrow(self.clearcoat_roughness, TextureSlot::ClearcoatRoughness);
+        !self.unlit
+            && is_polished
+            && may_be_opaque(self.transmission, TextureSlot::Transmission)
+            && may_be_opaque(self.diffuse_transmission, TextureSlot::DiffuseTransmission)
     }
 
     /// Whether as much light goes straight through as through another one with the same textures, and as much

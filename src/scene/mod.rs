@@ -28,6 +28,7 @@ pub use frame::Frame;
 pub(crate) use frame::in_digits;
 pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use light::{PunctualKind, PunctualLight};
+pub(crate) use material::MAX_POLISH_ROUGHNESS;
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};
 pub use material_edit::MaterialEdit;
 #[cfg(feature = "window")]

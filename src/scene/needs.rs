@@ -70,6 +70,8 @@ bitflags::bitflags! {
         const BACKED = 1 << 28;
         /// Opaque triangles that stand for a smooth surface ([`super::surface::SurfacePoint::lift`]).
         const LIFTED = 1 << 29;
+        /// Surfaces that may have narrow reflections beside broad ones: polish and varnish.
+        const POLISH = 1 << 30;
     }
 }
 
@@ -224,6 +226,7 @@ impl SceneNeeds {
             (S::ROUGH_GLASS, is_rough && m.transmission > 0.0),
             (S::CLEAR_SOLIDS, m.is_clear_solid()),
             (S::PERFECT_INTERFACES, m.may_be_smooth()),
+            (S::POLISH, m.may_be_polished()),
         ] {
             features.set(feature, is_needed || features.contains(feature));
         }

@@ -16,7 +16,7 @@ use lightgrid::render::{Crop, Gi, Phase, Sampling, Session, Sharing, StopRule, V
 use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, PunctualKind, PunctualLight, builtin, gltf};
 
-use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
+use crate::estimator::scenes::{self, lambert, lamp, painted, room, smoked_glass, varnish};
 use crate::estimator::{MODES, mean, render, view};
 use crate::instances::{many, placings};
 use crate::shared::shared;
@@ -378,6 +378,31 @@ fn pixels_share_the_same_vertices() {
         session.advance(1, &never).expect("rendering");
         let whole = render(&world, &environment, view, 4);
         assert!(difference_over_noise(session.film(), &whole) < 0.1);
+    }
+}
+
+/// Both devices take the same part of each surface, by the same random numbers.
+#[test]
+fn polish_and_varnish_are_parted_alike() {
+    let Some(gpu) = gpu() else { return };
+    let environment = sky_map("overcast");
+    for (what, paint) in [
+        ("polish", varnish(0.1, 1.0)),
+        ("a mirror over paint", varnish(0.4, 0.0)),
+        ("metal", Material { metallic: 1.0, ..varnish(0.12, 1.0) }),
+    ] {
+        let (world, camera) = painted(&paint);
+        for (sharing, gi) in [(Sharing::Large, Gi::Exact), (Sharing::Off, Gi::Cached)] {
+            let limits = PathLimits { bounces: 5, russian_roulette: true };
+            let view = view(camera.clone(), Sampling::Adaptive, 5);
+            let view = View { width: 40, height: 24, sharing, gi, limits, ..view };
+            let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 16);
+            let same = render(&world, &environment, view, 16);
+            let share = difference_over_noise(&gpu_film, &same);
+            eprintln!("{what}, {gi:?}: differences are {share:.6} of the noise");
+            let most = if gi == Gi::Exact { 0.01 } else { 0.1 };
+            assert!(share < most, "{what}, {gi:?}: {share}");
+        }
     }
 }
 

@@ -4,9 +4,9 @@ use glam::Vec3;
 
 use super::layout::{DIRECTIONAL_LIGHT, NO_TEXTURE, PUNCTUAL_WORDS, SPOT_LIGHT};
 use super::layout::{material_flags as material, texture_flags};
-use crate::bsdf::{albedo, coat, interface, microfacet, rescatter, sheen};
+use crate::bsdf::{albedo, coat, interface, lobes, microfacet, rescatter, sheen};
 use crate::light_grid::{WHOLE_MAP, cells, counters};
-use crate::path::{self, cached, light_tree, sharing, train};
+use crate::path::{self, light_tree, sharing, splitting, train};
 use crate::radiance_cache as cache;
 use crate::render::{cpu, filter};
 use crate::sampler;
@@ -75,14 +75,18 @@ constants! {
     FILTER_RADIUS: filter::FILTER_RADIUS,
     FILTER_STEPS: filter::STEPS,
     LEARNING_SEED: cpu::LEARNING_SEED,
-    MIN_ALPHA: sharing::MIN_ALPHA,
-    MIN_CACHED_ALPHA: cached::MIN_ALPHA,
+    MIN_CACHED_ALPHA: splitting::MIN_CACHED_ALPHA,
+    MIN_SHARED_ALPHA: splitting::MIN_SHARED_ALPHA,
     MIN_COMPONENT: crate::medium::MIN_COMPONENT,
+    MIN_NARROW: splitting::MIN_NARROW,
+    MIN_SHARED_NARROW: splitting::MIN_SHARED_NARROW,
     MIN_COSINE: light_tree::MIN_COSINE,
     MIN_SHARE: train::MIN_SHARE,
     MIN_SURVIVAL: path::MIN_SURVIVAL,
     LIGHT_LEAF: light_tree::LEAF,
     MAX_INTERFACES: path::MAX_INTERFACES,
+    MAX_NARROW_PROBABILITY: lobes::MAX_NARROW_PROBABILITY,
+    MAX_NARROW_SHARE: lobes::MAX_NARROW_SHARE,
     MAX_PASSES: path::MAX_PASSES,
     MAX_WEIGHT: counters::MAX_WEIGHT,
     MEDIUM_FACE: cells::MEDIUM_FACE,

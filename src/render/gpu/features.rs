@@ -80,8 +80,15 @@ pub(crate) struct Features {
 }
 
 /// Features of scenes that kernels ask for by what follows from them alone.
-const NOT_ASKED_FOR: [&str; 6] =
-    ["ABSORPTION", "ALPHA_BLEND", "FOG", "ROUGH_GLASS", "SCATTERING_SOLIDS", "THIN_TRANSMISSION"];
+const NOT_ASKED_FOR: [&str; 7] = [
+    "ABSORPTION",
+    "ALPHA_BLEND",
+    "FOG",
+    "POLISH",
+    "ROUGH_GLASS",
+    "SCATTERING_SOLIDS",
+    "THIN_TRANSMISSION",
+];
 
 /// Refuses what is only measured, and has no kernels.
 ///
@@ -100,7 +107,7 @@ pub(super) fn check(view: &View) -> Result<()> {
 type Condition = fn(&Features) -> bool;
 
 /// What follows from the others, by name.
-const DERIVED: [(&str, Condition); 12] = {
+const DERIVED: [(&str, Condition); 13] = {
     use {SceneFeatures as S, ViewFeatures as V};
     [
         // Some hits of closest-hit rays do not count.
@@ -114,6 +121,11 @@ const DERIVED: [(&str, Condition); 12] = {
         ("SHADOW_MEDIA", |f| f.view.contains(V::MEDIUM) || f.scene.contains(S::SOLID_TRANSMISSION)),
         ("SHADOW_RAYS", Features::shadow_rays),
         ("SOFTWARE_WALK", Features::software_walk),
+        // Narrow lobes are followed apart from broad ones, which are shared or cached.
+        ("SPLIT_LOBES", |f| {
+            let uses = KernelFeatures::SHARING | KernelFeatures::CACHED | KernelFeatures::TRAINING;
+            f.scene.contains(S::POLISH) && f.kernel.intersects(uses)
+        }),
         // Glass that spreads what it lets through.
         ("SPREADING_GLASS", |f| f.scene.contains(S::ROUGH_GLASS) && f.transmission()),
         ("TANGENTS", Features::tangents),

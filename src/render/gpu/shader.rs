@@ -333,7 +333,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
         (wgsl!("shadows"), has_shadow_rays),
         (wgsl!("gather"), has_shadow_rays && kernel != Kernel::Learn),
         (wgsl!("no_lights"), !has_shadow_rays && kernel != Kernel::Learn),
-        (wgsl!("broad"), kernel.shares() || view.contains(ViewFeatures::RADIANCE_CACHE)),
+        (wgsl!("lobes"), kernel.shares() || view.contains(ViewFeatures::RADIANCE_CACHE)),
         (wgsl!("radiance_cache"), view.contains(ViewFeatures::RADIANCE_CACHE)),
         (wgsl!("count"), view.contains(ViewFeatures::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),

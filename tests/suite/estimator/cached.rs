@@ -2,14 +2,14 @@
 
 use std::sync::atomic::AtomicBool;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3, Vec4};
 use lightgrid::environment::sky;
 use lightgrid::path::{Background, PathLimits, World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
-use lightgrid::scene::{Camera, PunctualKind, PunctualLight};
+use lightgrid::scene::{Camera, Material, PunctualKind, PunctualLight};
 
-use super::scenes::{lambert, lamp, room, sunlight};
+use super::scenes::{lambert, lamp, painted, room, sunlight, varnish};
 use super::{constant, environment, learned, mean, render, view};
 
 fn picture(camera: &Camera, gi: Gi, seed: u32) -> View {
@@ -55,10 +55,38 @@ fn a_room_is_as_bright_and_less_noisy() {
     assert!(gain > 1.4, "{gain}");
 }
 
+/// Polish and varnish do not keep paths from ending in what is known of the paint below.
+#[test]
+fn polished_and_varnished_rooms_are_as_bright_and_less_noisy() {
+    let red = |material| Material { base_color: Vec4::new(0.9, 0.2, 0.1, 1.0), ..material };
+    for (what, paint) in [("polish", varnish(0.1, 1.0)), ("varnish", red(varnish(1.0, 0.1)))] {
+        let (world, camera) = painted(&paint);
+        let sky = environment(sky::build("overcast", 64, 32).expect("a sky"));
+        let truth = render(&world, &sky, picture(&camera, Gi::Exact, 7), 512);
+        let rendered = |gi| {
+            let mut session = learned(&world, &sky, picture(&camera, gi, 1));
+            session.advance(64, &AtomicBool::new(false)).expect("the CPU does not fail");
+            (session.film().clone(), session.figures().rays as f64)
+        };
+        let [(exact, rays), (cached, cached_rays)] = [Gi::Exact, Gi::Cached].map(rendered);
+        let colors = |film: &Film| {
+            let pixels = film.pixels().iter().map(|pixel| DVec3::from(pixel.mean()));
+            pixels.sum::<DVec3>() / film.pixels().len() as f64
+        };
+        let off = colors(&cached) / colors(&truth) - 1.0;
+        let gain = (mean(&exact).standard_error / mean(&cached).standard_error).powi(2);
+        let fewer_rays = rays / cached_rays;
+        eprintln!("{what}: mean {off:+.4}, variance / {gain:.2}, rays / {fewer_rays:.2}");
+        assert!(off.abs().max_element() < 0.02, "{what}: {off}");
+        assert!(difference(&cached, &truth) < 0.05, "{what}");
+        assert!(gain * fewer_rays > 1.5, "{what}: {gain} {fewer_rays}");
+    }
+}
+
 /// In a closed box that glows all over, a path finds the same wherever it goes.
 #[test]
 fn a_glowing_box_is_as_bright_as_its_bounces_make_it() {
-    let glow = lightgrid::scene::Material { emissive: Vec3::splat(0.3), ..lambert(0.5) };
+    let glow = Material { emissive: Vec3::splat(0.3), ..lambert(0.5) };
     let world =
         WorldBuilder::default().faces(&glow, Vec3::splat(-2.0), Vec3::splat(2.0), 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.3, 0.2, 0.1), Vec3::new(1.0, 0.5, -2.0), 1.0);

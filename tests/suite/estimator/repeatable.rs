@@ -232,7 +232,7 @@ fn another_seed_gives_another_picture() {
 }
 
 /// The version that [`PICTURES`] are of.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Scene, sampling and sharing of small pictures, and what they come to: their mean, and how they are spread.
 const PICTURES: [(&str, Sampling, Sharing, &str); 8] = [
@@ -240,9 +240,9 @@ const PICTURES: [(&str, Sampling, Sharing, &str); 8] = [
     ("open", Sampling::Plain, Sharing::Off, "4.492e-1 14.774"),
     ("office", Sampling::Talk, Sharing::Off, "2.340e-2 16.731"),
     ("office", Sampling::Adaptive, Sharing::Off, "2.262e-2 17.382"),
-    ("office", Sampling::Adaptive, Sharing::Large, "2.265e-2 17.477"),
+    ("office", Sampling::Adaptive, Sharing::Large, "2.285e-2 17.435"),
     ("evening", Sampling::Adaptive, Sharing::Off, "2.739e-2 16.590"),
-    ("fog", Sampling::Adaptive, Sharing::Small, "3.797e-2 14.986"),
+    ("fog", Sampling::Adaptive, Sharing::Small, "3.819e-2 14.979"),
     ("materials", Sampling::Adaptive, Sharing::Off, "2.054e-1 15.049"),
 ];
 

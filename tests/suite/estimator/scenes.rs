@@ -120,6 +120,22 @@ pub(crate) fn with_half_texture() -> WorldBuilder {
     builder
 }
 
+/// Grey paint of this roughness under a clearcoat of that one, which is none from 1 on.
+pub(crate) fn varnish(roughness: f32, clearcoat_roughness: f32) -> Material {
+    let clearcoat = if clearcoat_roughness < 1.0 { 1.0 } else { 0.0 };
+    Material { roughness, specular: 1.0, clearcoat, clearcoat_roughness, ..lambert(0.7) }
+}
+
+/// [`room`] with this material on all surfaces, but in their own colours.
+pub(crate) fn painted(paint: &Material) -> (World, Camera) {
+    let (world, camera) = room(0.7, None);
+    let mut scene = world.scene.clone();
+    for material in &mut scene.materials {
+        *material = Material { base_color: material.base_color, ..paint.clone() };
+    }
+    (World::new(scene), camera)
+}
+
 /// A room of 4 x 2.5 x 3 metres with a large window in its +X wall and a block on the floor; the
 /// camera looks at the block from beside the window.
 pub(crate) fn room(albedo: f32, window: Option<&Material>) -> (World, Camera) {

@@ -12,10 +12,13 @@ use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::{Sampling, Session, Sharing, View};
 use lightgrid::sampler::{hash, unit_from_bits};
-use lightgrid::scene::{AlphaMode, Camera, Material, Medium, Scene, builtin};
+use lightgrid::scene::{
+    AlphaMode, Camera, Material, Medium, Scene, Texture, TextureImage, TextureRef, TextureSlot,
+    Wrap, builtin,
+};
 use rayon::prelude::*;
 
-use super::scenes::{black, blended, lambert, lamp, pane, room};
+use super::scenes::{black, blended, lambert, lamp, painted, pane, room, varnish};
 use super::{environment, mean, view};
 use crate::z_test::expect_same_pixels;
 
@@ -144,6 +147,80 @@ fn where_normals_are_bent_and_metal_is_bumpy() {
             scene.normals = normals;
         });
         expect_unbiased(what, (&world, &overcast(), &camera), 24, 0.01);
+    }
+}
+
+/// The room with normal maps on paint and varnish that tilt by up to some 40 degrees, each its own way.
+fn bumpy(paint: &Material) -> (World, Camera) {
+    let (world, camera) = painted(paint);
+    let world = changed(&world, |scene| {
+        let texel = |n: u32| [0, 1, 2, 3].map(|k| (hash(4 * n + k) >> 24) as u8);
+        for first in [0, 64] {
+            let texels = (first..first + 64).map(|n| {
+                let [x, y, ..] = texel(n);
+                [x, y, 240, 255]
+            });
+            let texels = texels.collect::<Vec<_>>().into();
+            scene.images.push(TextureImage { width: 8, height: 8, texels });
+            let (image, wrap) = (scene.textures.len() as u32, Wrap::Repeat);
+            let texture = Texture { image, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: false };
+            scene.textures.push(texture);
+        }
+        for material in &mut scene.materials {
+            let slots = [TextureSlot::Normal, TextureSlot::ClearcoatNormal];
+            *material = slots.into_iter().zip(0..).fold(material.clone(), |material, (slot, n)| {
+                let transform = glam::Affine2::IDENTITY;
+                material.with_texture(slot, TextureRef { texture: n, uv_set: 0, transform })
+            });
+        }
+        scene.tangents = vec![glam::Vec4::ZERO; scene.positions.len()];
+        for corners in &scene.triangles {
+            let [a, b, _] = corners.map(|i| scene.positions[i as usize]);
+            let tangent = (b - a).normalize().extend(1.0);
+            corners.iter().for_each(|&i| scene.tangents[i as usize] = tangent);
+        }
+    });
+    (world, camera)
+}
+
+#[test]
+fn where_surfaces_are_polished_or_varnished() {
+    for (what, paint) in [
+        ("polish", varnish(0.1, 1.0)),
+        ("varnish", varnish(0.4, 0.1)),
+        ("mirrors over paint", varnish(1.0, 0.0)),
+        ("polish under a broad coat", varnish(0.05, 0.4)),
+    ] {
+        let (world, camera) = painted(&paint);
+        expect_unbiased(what, (&world, &overcast(), &camera), 24, 0.01);
+    }
+    for (what, paint) in [("bumpy polish", varnish(0.1, 1.0)), ("bumpy varnish", varnish(0.5, 0.3))]
+    {
+        let (world, camera) = bumpy(&paint);
+        expect_unbiased(what, (&world, &overcast(), &camera), 24, 0.01);
+    }
+}
+
+/// What is under the polish is shared.
+#[test]
+fn polish_and_varnish_keep_what_sharing_gains() {
+    for (what, paint) in [("polish", varnish(0.1, 1.0)), ("varnish", varnish(0.4, 0.1))] {
+        let (world, camera) = painted(&paint);
+        let film = |sharing, seed, samples| {
+            let view = picture(&camera, Sampling::Adaptive, sharing, seed);
+            render(&world, &overcast(), view, samples)
+        };
+        let truth = film(Sharing::Off, 1, 2048).image();
+        let error = |sharing| -> f64 {
+            let of = |seed| {
+                let film: Film = film(sharing, seed, 32);
+                relative_rms_error(&film.image(), &truth).expect("of a size, and not black").powi(2)
+            };
+            (10..18).map(of).sum::<f64>() / 8.0
+        };
+        let gain = error(Sharing::Off) / error(Sharing::Large);
+        eprintln!("{what}: variance / {gain:.2}");
+        assert!(gain > 1.3, "{what}: {gain}");
     }
 }
 
