@@ -22,7 +22,11 @@ fn is_alike_nearby(vertex: Vertex) -> bool {
         return true;
     }
 //#end
-    return !refracts(vertex) && is_broad(vertex, MIN_SHARED_ALPHA);
+    var min_alpha = MIN_WHOLE_ALPHA;
+//#if SPLIT_LOBES
+    min_alpha = select(MIN_SHARED_ALPHA, MIN_WHOLE_ALPHA, vertex.bsdf.weights.z == 1.0);
+//#end
+    return !refracts(vertex) && is_broad(vertex, min_alpha);
 }
 
 // The vertex that the path is at, as it is kept.

@@ -32,7 +32,7 @@ fn narrow_share(b: Bsdf, min_alpha: f32, wo: vec3f) -> f32 {
 // One part of a BSDF, by the share of its narrow lobes and a uniform number: twin of `LobeWeights::of_part`.
 fn part_of(b: Bsdf, min_alpha: f32, share: f32, min_probability: f32, u: f32) -> Bsdf {
     let narrow = vec3f(select(vec2f(0.0), vec2f(1.0), narrow_lobes(b, min_alpha)), 0.0);
-    let probability = clamp(share, min_probability, MAX_NARROW_PROBABILITY);
+    let probability = max(share, min_probability);
     var part = b;
     if u < probability {
         part.weights = narrow / probability;

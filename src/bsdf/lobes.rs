@@ -1,10 +1,8 @@
 //! The split of a BSDF into its narrow and its broad lobes: varnish reflects a narrow cone, the paint below it scatters
 //! to all sides. A path that samples either part, divided by the probability of that part, is unbiased.
 
-/// Maximum share of narrow lobes at which a BSDF is split.
-pub(crate) const MAX_NARROW_SHARE: f32 = 0.95;
-/// Maximum probability of the narrow part: the broad one has a minimum of samples.
-pub(crate) const MAX_NARROW_PROBABILITY: f32 = 0.8;
+/// Maximum share of narrow lobes at which a BSDF is split: a black screen has little below its polish.
+pub(crate) const MAX_NARROW_SHARE: f32 = 0.5;
 
 /// Weights of lobes: 0 for absent ones, the same value for the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +81,7 @@ mod tests {
                     ..coat(0.1, rough)
                 },
             ),
-            ("half metal", SurfaceParameters { metallic: 0.5, ..p }),
+            ("partly metal", SurfaceParameters { metallic: 0.1, ..p }),
             ("stretched", SurfaceParameters { anisotropy: 0.05, ..p }),
             (
                 "cloth",
@@ -197,7 +195,7 @@ mod tests {
         for (what, p) in [
             ("broad", SurfaceParameters { roughness: 0.3, ..p }),
             ("metal", SurfaceParameters { metallic: 1.0, ..p }),
-            ("black", SurfaceParameters { base_color: Vec3::ZERO, ..p }),
+            ("screen", SurfaceParameters { base_color: Vec3::splat(0.012), ..p }),
         ] {
             let bsdf = Bsdf::new(&p, true);
             assert_eq!(

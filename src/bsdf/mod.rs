@@ -37,7 +37,7 @@ use coat::Coat;
 use diffuse::Diffuse;
 use fresnel::normal_reflectance;
 use interface::Interface;
-use lobes::{LobeWeights, MAX_NARROW_PROBABILITY, MAX_NARROW_SHARE};
+use lobes::{LobeWeights, MAX_NARROW_SHARE};
 use rescatter::Rescatter;
 use sheen::Sheen;
 
@@ -212,9 +212,14 @@ impl Bsdf {
         let by_interface = out.interface_probability + out.rescatter_probability;
         let share = f32::from(coat) * out.coat_probability + f32::from(interface) * by_interface;
         (share > 0.0 && share <= MAX_NARROW_SHARE).then(|| {
-            let probability = share.clamp(min_probability, MAX_NARROW_PROBABILITY);
+            let probability = share.max(min_probability);
             Self { weights: LobeWeights::of_part(narrow, probability, u()), ..*self }
         })
+    }
+
+    /// Whether it is no part of another one.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.weights == LobeWeights::ALL
     }
 
     /// The factor of a part: 1 over its probability.
@@ -268,8 +273,8 @@ impl Bsdf {
             && (weights.coat == 0.0 || self.coat.is_delta_or_absent())
     }
 
-    /// Share of uniform light from everywhere that reaches a viewer straight above, at least 0 and at most
-    /// [`Self::weight`], which is 1 of a whole BSDF; an estimate for guide layers of denoisers.
+    /// Share of uniform light from everywhere that reaches a viewer straight above, in `[0,1]`, or times the weight of a
+    /// part; an estimate for guide layers of denoisers.
     pub fn albedo(&self) -> Vec3 {
         let up = Vec3::Z;
         let terms = self.diffuse.terms_at(up);
@@ -279,11 +284,11 @@ impl Bsdf {
             self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
         let rescattered = self.rescatter.as_ref();
         let rescattered = rescattered.map_or(Vec3::ZERO, |lobe| lobe.albedo(lobe.lost(up), scale));
-        let LobeWeights { others, .. } = self.weights;
-        let base = (interface + rescattered) * self.weights.interface + diffuse * others;
+        let base =
+            (interface + rescattered) * self.weights.interface + diffuse * self.weights.others;
         let base = self.sheen.left(up, Sheen::TYPICAL) * base;
         let under = self.coat.attenuation(up);
-        let under = under * under * (self.sheen.colored_albedo(up) * others + base);
+        let under = under * under * (self.sheen.colored_albedo(up) * self.weights.others + base);
         let albedo = self.coat.albedo(up) * self.weights.coat + under;
         albedo.clamp(Vec3::ZERO, Vec3::splat(self.weights.max()))
     }

@@ -37,11 +37,11 @@ impl Path<'_> {
         is_known
     }
 
-    /// Whether the cache knows what the path would find from a surface that it has arrived at.
+    /// Whether the cache, if there is one, knows what the path would find from a surface that it has arrived at.
     pub(super) fn is_known(&self, position: Vec3, normal: Vec3) -> bool {
         let is_wide =
             |cache: &RadianceCache| spread_at(self, normal) >= cache.cells().edge_at(position);
-        self.is_in_air() && self.tracer.cache.is_some_and(is_wide)
+        self.is_in_air() && self.tracer.cache.is_none_or(is_wide)
     }
 
     /// Spreads the path over the way to where it has arrived, if anybody asks.

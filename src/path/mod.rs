@@ -245,8 +245,8 @@ impl<'a> Path<'a> {
         if !self.counts_vertex() {
             return false;
         }
-        let gathers = vertex.scatterer.gathers();
-        let lights = gathers.then(|| self.choose_lights(vertex)).unwrap_or_default();
+        let lights = vertex.scatterer.gathers().then(|| self.choose_lights(vertex));
+        let lights = lights.unwrap_or_default();
         // Meanwhile memory is fetched.
         let onward = self.choose_onward(vertex);
         let mut gathered = Vec3::ZERO;
@@ -319,12 +319,11 @@ impl<'a> Path<'a> {
     fn part_of(&mut self, point: &SurfacePoint<'_>, bsdf: &Bsdf) -> Option<Bsdf> {
         let uses = self.use_of_vertices;
         let min_alpha = uses.min_alpha(self.bounces)?;
-        let (parameters, is_cached) = (&point.parameters, matches!(uses, UseOfVertices::Cached));
+        let parameters = &point.parameters;
         if bsdf.is_broad(min_alpha)
             || parameters.transmission > 0.0
             || parameters.diffuse_transmission > 0.0
-            || !self.is_in_air()
-            || is_cached && !self.is_known(point.position, point.geometric_normal)
+            || !self.is_known(point.position, point.geometric_normal)
         {
             return None;
         }

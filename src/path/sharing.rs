@@ -12,14 +12,14 @@
 //! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for
 //! all pixels; whatever does not goes on as a path of its own.
 //!
-//! Of a varnished surface only the broad lobes are shared ([`super::splitting`]). Their probability at y is the same for
-//! all pixels: the weight of the part cancels it, so it is not in the density.
+//! Of a varnished surface only the broad lobes are shared. Their probability at y is the same for all pixels: the
+//! weight of the part cancels it, so it is not in the density.
 
 use std::ops::Range;
 
 use glam::Vec3;
 
-use super::splitting::{MIN_SHARED_ALPHA, UseOfVertices};
+use super::splitting::{MIN_SHARED_ALPHA, MIN_WHOLE_ALPHA, UseOfVertices};
 use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
 use super::{Path, PathResult, PathTracer, SHADOW_RAY_SHARE};
 use crate::bsdf::Bsdf;
@@ -226,7 +226,9 @@ impl Scatterer<'_> {
     fn is_alike_nearby(&self) -> bool {
         match self {
             Self::Surface(surface) => {
-                !surface.refracts && surface.bsdf().is_broad(MIN_SHARED_ALPHA)
+                let bsdf = surface.bsdf();
+                let min_alpha = if bsdf.is_whole() { MIN_WHOLE_ALPHA } else { MIN_SHARED_ALPHA };
+                !surface.refracts && bsdf.is_broad(min_alpha)
             }
             Self::Medium(_) => true,
         }

@@ -240,9 +240,9 @@ const PICTURES: [(&str, Sampling, Sharing, &str); 8] = [
     ("open", Sampling::Plain, Sharing::Off, "4.492e-1 14.774"),
     ("office", Sampling::Talk, Sharing::Off, "2.340e-2 16.731"),
     ("office", Sampling::Adaptive, Sharing::Off, "2.262e-2 17.382"),
-    ("office", Sampling::Adaptive, Sharing::Large, "2.285e-2 17.435"),
+    ("office", Sampling::Adaptive, Sharing::Large, "2.285e-2 17.437"),
     ("evening", Sampling::Adaptive, Sharing::Off, "2.739e-2 16.590"),
-    ("fog", Sampling::Adaptive, Sharing::Small, "3.819e-2 14.979"),
+    ("fog", Sampling::Adaptive, Sharing::Small, "3.803e-2 15.014"),
     ("materials", Sampling::Adaptive, Sharing::Off, "2.054e-1 15.049"),
 ];
 
