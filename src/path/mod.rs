@@ -315,7 +315,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The narrow or the broad lobes of a BSDF, if only the broad ones are of use there beside the path itself.
+    /// The narrow or the broad lobes of a BSDF, where only the broad ones can be shared or cached.
     fn part_of(&mut self, point: &SurfacePoint<'_>, bsdf: &Bsdf) -> Option<Bsdf> {
         let uses = self.use_of_vertices;
         let min_alpha = uses.min_alpha(self.bounces)?;

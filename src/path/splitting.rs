@@ -38,7 +38,7 @@ impl UseOfVertices {
         if has_cache { Self::Cached } else { Self::None }
     }
 
-    /// Minimum GGX alpha of lobes that are of use at the vertex after so many others; `None` if none are.
+    /// Minimum GGX alpha of broad lobes at the vertex that follows `bounces` others; `None` where BSDFs stay whole.
     pub(super) fn min_alpha(self, bounces: u32) -> Option<f32> {
         match self {
             Self::Shared if bounces < 2 => Some(MIN_SHARED_ALPHA),

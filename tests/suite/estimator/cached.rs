@@ -55,7 +55,7 @@ fn a_room_is_as_bright_and_less_noisy() {
     assert!(gain > 1.4, "{gain}");
 }
 
-/// Polish and varnish do not keep paths from ending in what is known of the paint below.
+/// Paths end in the cached radiance of the paint below polish and varnish.
 #[test]
 fn polished_and_varnished_rooms_are_as_bright_and_less_noisy() {
     let red = |material| Material { base_color: Vec4::new(0.9, 0.2, 0.1, 1.0), ..material };
