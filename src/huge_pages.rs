@@ -9,18 +9,19 @@ pub(crate) fn on_huge_pages<T>(values: Vec<T>) -> Vec<T> {
     if size_of_val(values.as_slice()) < WORTHWHILE_BYTES {
         return values;
     }
-    let mut moved = Vec::with_capacity(values.len());
-    advise(&mut moved);
-    moved.extend(values);
-    moved
+    joined_on_huge_pages(vec![values])
+}
+
+/// All lists one after the other, in such memory.
+pub(crate) fn joined_on_huge_pages<T>(lists: Vec<Vec<T>>) -> Vec<T> {
+    let mut joined = reserved(lists.iter().map(Vec::len).sum());
+    lists.into_iter().for_each(|list| joined.extend(list));
+    joined
 }
 
 /// `count` zeros in such memory, to be filled: nothing is held twice on the way.
 pub(crate) fn zeros_on_huge_pages<T: bytemuck::Zeroable + Clone>(count: usize) -> Vec<T> {
-    let mut zeros = Vec::with_capacity(count);
-    if count * size_of::<T>() >= WORTHWHILE_BYTES {
-        advise(&mut zeros);
-    }
+    let mut zeros = reserved(count);
     zeros.resize(count, T::zeroed());
     zeros
 }
@@ -28,9 +29,13 @@ pub(crate) fn zeros_on_huge_pages<T: bytemuck::Zeroable + Clone>(count: usize) -
 /// Two huge pages of x86-64.
 const WORTHWHILE_BYTES: usize = 4 << 20;
 
-fn advise<T>(memory: &mut Vec<T>) {
-    let start = memory.as_mut_ptr().addr();
-    advise_huge_pages(start..start + memory.capacity() * size_of::<T>());
+fn reserved<T>(count: usize) -> Vec<T> {
+    let mut memory = Vec::<T>::with_capacity(count);
+    if count * size_of::<T>() >= WORTHWHILE_BYTES {
+        let start = memory.as_mut_ptr().addr();
+        advise_huge_pages(start..start + memory.capacity() * size_of::<T>());
+    }
+    memory
 }
 
 #[cfg(test)]

@@ -136,8 +136,6 @@ pub enum TileView {
     Energy,
     /// Share of what all cells together have learned to sample.
     Learned,
-    /// Tiles of equal energy, which are not used.
-    EqualEnergy,
 }
 
 /// What is open below the picture.

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use super::document::Document;
 use super::threads::{Wake, lock, spawn};
-use crate::environment::sun::{Sun, SunTexels, equal_energy_tiles};
+use crate::environment::sun::{Sun, SunTexels};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{At as _, Error, Notices, Result};
 use crate::image::{Image, catch_panic};
@@ -88,8 +88,6 @@ pub struct LoadedMap {
     pub preview: Arc<Image>,
     /// Where it is brightest; `None` on a black map.
     pub sun: Option<Sun>,
-    /// As many tiles of equal energy, in texels of `preview`.
-    pub equal_energy: Arc<[[u32; 4]]>,
     /// What was repaired or assumed.
     pub notices: Notices,
     /// Seconds of reading and of building the table.
@@ -136,12 +134,10 @@ impl LoadedMap {
         let environment = Environment::new(map, &options).at(name)?;
         let seconds = [seconds_of_reading, start.elapsed().as_secs_f64()];
         let preview = environment.map().shrunk(256);
-        let count = environment.tile_count() as usize;
         Ok(Self {
             name: name.to_owned(),
             sun_factor,
             sun: Sun::of(environment.map()),
-            equal_energy: equal_energy_tiles(&preview, count).into(),
             preview: Arc::new(preview),
             environment: Arc::new(environment),
             notices,

@@ -21,6 +21,19 @@ pub(super) fn is_available() -> bool {
 #[derive(Clone, Copy)]
 struct Avx2(__m256);
 
+/// Operations on two registers.
+macro_rules! of_two {
+    ($($name:ident = $intrinsic:ident;)+) => {
+        $(
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: the machine has AVX2, see `Avx2`.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        )+
+    };
+}
+
 impl Lanes for Avx2 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -39,40 +52,18 @@ impl Lanes for Avx2 {
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
         values
     }
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_add_ps(self.0, other.0) })
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_div_ps(self.0, other.0) })
+    of_two! {
+        add = _mm256_add_ps;
+        sub = _mm256_sub_ps;
+        mul = _mm256_mul_ps;
+        div = _mm256_div_ps;
+        min = _mm256_min_ps;
+        max = _mm256_max_ps;
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         // SAFETY: the machine has FMA, see `Avx2`.
         Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, term.0) })
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_min_ps(self.0, other.0) })
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        // SAFETY: the machine has AVX2, see `Avx2`.
-        Self(unsafe { _mm256_max_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn le(self, other: Self) -> u32 {

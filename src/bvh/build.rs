@@ -1,4 +1,4 @@
-//! Collapses binary trees into eight-wide trees of least cost.
+//! Collapses binary trees into eight-wide trees of least cost, on all threads of the current rayon pool.
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
@@ -6,17 +6,16 @@ use rayon::prelude::*;
 
 use super::instance::{Instance, Placed, Shared};
 use super::items::{Item, Items, Sources};
+use super::weighing::Weighing;
 use super::wide::{Block, INSTANCE, LEAF, MAX_DEPTH, Node, Reference, WIDTH};
-
-/// Cost of testing one block of triangles, relative to one node.
-const BLOCK_COST: f32 = 1.5;
-
-/// Cost of entering an instance, relative to one node: a ray is brought there, and meets a few nodes.
-const INSTANCE_COST: f32 = 4.0;
+use crate::huge_pages::joined_on_huge_pages;
 
 /// Depth from which subtrees are halved by count instead of by cost. `u32` counts fall to one block
 /// within `ceil(32 / 3)` further levels, so [`MAX_DEPTH`] holds for every input.
 const BALANCED_FROM_DEPTH: usize = MAX_DEPTH - 12;
+
+/// Levels of a wide tree below which one thread writes each subtree.
+const TOP_LEVELS: usize = 4;
 
 /// The finished parts of a tree.
 pub(super) struct Tree {
@@ -31,79 +30,21 @@ pub(super) struct Tree {
 /// root even of an empty scene.
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'_>) -> Tree {
     let sources = Sources { positions, triangles };
-    let mut written = Written::default();
+    let mut parts = Parts::default();
     let meshes = shared.meshes.iter();
-    let roots: Vec<Reference> =
-        meshes.map(|mesh| written.collapse(&Items::new(sources, mesh.clone(), &[])).0).collect();
+    let roots: Vec<Root> =
+        meshes.map(|mesh| parts.collapse(&Items::new(sources, mesh.clone(), &[]))).collect();
     let place = |instance: &Instance| {
         let mesh = instance.mesh as usize;
-        let root = roots[mesh];
-        Placed::new(instance, &shared.meshes[mesh], root, &written.nodes[root as usize])
+        let root = &roots[mesh];
+        Placed::new(instance, &shared.meshes[mesh], root.reference, &root.node)
     };
     let placed: Vec<Placed> = shared.instances.par_iter().map(place).collect();
     let own = shared.own(triangles.len()) as u32;
-    let (root, bounds) = written.collapse(&Items::new(sources, 0..own, &placed));
-    Tree { nodes: written.nodes, blocks: written.blocks, placed, root, bounds }
-}
-
-/// Least costs of one subtree (Ylitie, Karras, Laine, *Efficient Incoherent Ray Traversal on GPUs
-/// Through Compressed Wide BVHs*, HPG 2017, section 3.1), each an area times a number of tests.
-#[derive(Clone, Copy)]
-struct SubtreeCosts {
-    /// `forest[i]`: the subtree as at most `i + 1` children of a wide node.
-    forest: [f32; WIDTH - 1],
-    /// Triangles in the subtree; more than a block has where there are instances.
-    count: u32,
-}
-
-impl SubtreeCosts {
-    /// Cost of two siblings sharing `slots` children, and how many the left one gets.
-    fn split(left: &Self, right: &Self, slots: usize) -> (f32, usize) {
-        (1..slots)
-            .map(|taken| (left.forest[taken - 1] + right.forest[slots - taken - 1], taken))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .expect("a node of two children has at least two slots")
-    }
-}
-
-/// Costs of all nodes of the binary tree, children before parents.
-fn subtree_costs(items: &Items<'_>, binary: &Bvh2) -> Vec<SubtreeCosts> {
-    let mut order = vec![0_u32];
-    let mut next = 0;
-    while let Some(&index) = order.get(next) {
-        let node = &binary.nodes[index as usize];
-        if !node.is_leaf() {
-            order.extend([node.first_index, node.first_index + 1]);
-        }
-        next += 1;
-    }
-    let unset = SubtreeCosts { forest: [0.0; WIDTH - 1], count: 0 };
-    let mut costs = vec![unset; binary.nodes.len()];
-    for &index in order.iter().rev() {
-        let node = &binary.nodes[index as usize];
-        let area = node.aabb().half_area();
-        costs[index as usize] = if items.instance_of(binary, index).is_some() {
-            // Too many for a block.
-            SubtreeCosts { forest: [area * INSTANCE_COST; WIDTH - 1], count: WIDTH as u32 + 1 }
-        } else if node.is_leaf() {
-            SubtreeCosts { forest: [area * BLOCK_COST; WIDTH - 1], count: node.prim_count }
-        } else {
-            let children = node.first_index as usize;
-            inner_costs(area, &costs[children], &costs[children + 1])
-        };
-    }
-    costs
-}
-
-fn inner_costs(area: f32, left: &SubtreeCosts, right: &SubtreeCosts) -> SubtreeCosts {
-    let count = left.count + right.count;
-    let as_node = area + SubtreeCosts::split(left, right, WIDTH).0;
-    let as_block = if count as usize <= WIDTH { area * BLOCK_COST } else { f32::INFINITY };
-    let mut forest = [as_node.min(as_block); WIDTH - 1];
-    for slots in 2..WIDTH {
-        forest[slots - 1] = SubtreeCosts::split(left, right, slots).0.min(forest[slots - 2]);
-    }
-    SubtreeCosts { forest, count }
+    let root = parts.collapse(&Items::new(sources, 0..own, &placed));
+    let (nodes, blocks) =
+        rayon::join(|| joined_on_huge_pages(parts.nodes), || joined_on_huge_pages(parts.blocks));
+    Tree { nodes, blocks, placed, root: root.reference, bounds: root.bounds }
 }
 
 fn bounds(binary: &Bvh2, index: u32) -> (Vec3, Vec3) {
@@ -111,46 +52,104 @@ fn bounds(binary: &Bvh2, index: u32) -> (Vec3, Vec3) {
     (bounds.min.into(), bounds.max.into())
 }
 
-/// Wide trees, one after the other.
-#[derive(Default)]
-struct Written {
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
+/// The root of a wide tree.
+struct Root {
+    reference: Reference,
+    node: Node,
+    bounds: (Vec3, Vec3),
 }
 
-impl Written {
-    /// Appends the tree over some items; its root and the box around it.
-    fn collapse(&mut self, items: &Items<'_>) -> (Reference, (Vec3, Vec3)) {
+/// Wide trees, to be put one after the other.
+#[derive(Default)]
+struct Parts {
+    nodes: Vec<Vec<Node>>,
+    blocks: Vec<Vec<Block>>,
+    /// How many nodes and blocks they have together.
+    counts: [u32; 2],
+}
+
+impl Parts {
+    /// Appends the tree over some items.
+    fn collapse(&mut self, items: &Items<'_>) -> Root {
         let Some(binary) = items.binary() else {
-            self.nodes.push(Node::EMPTY);
-            return (self.nodes.len() as Reference - 1, (Vec3::ZERO, Vec3::ZERO));
+            let node = Node::EMPTY;
+            let reference = self.push(vec![node.clone()], Vec::new());
+            return Root { reference, node, bounds: (Vec3::ZERO, Vec3::ZERO) };
         };
-        let costs = subtree_costs(items, &binary);
-        self.nodes.reserve(items.triangles.len() / 24);
-        self.blocks.reserve(items.triangles.len() / 4);
-        let mut collapse = Collapse { items, binary: &binary, costs: &costs, written: self };
-        (collapse.root(), bounds(&binary, 0))
+        let weighing = Weighing::new(items, &binary);
+        let mut top = Collapse::new(&weighing, TOP_LEVELS);
+        top.root();
+        let write = |subtree: &Subtree| {
+            let mut below = Collapse::new(&weighing, usize::MAX);
+            below.node(subtree.index, TOP_LEVELS);
+            (below.nodes, below.blocks)
+        };
+        let below: Vec<_> = top.subtrees.par_iter().map(write).collect();
+        let first = self.nodes.len();
+        let reference = self.push(top.nodes, top.blocks);
+        for (subtree, (nodes, blocks)) in top.subtrees.iter().zip(below) {
+            let root = self.push(nodes, blocks);
+            self.nodes[first][subtree.parent as usize].children[subtree.lane] = root;
+        }
+        let node = self.nodes[first][0].clone();
+        Root { reference, node, bounds: bounds(&binary, 0) }
     }
+
+    /// Appends a tree whose references count from its own first node and block; the root's.
+    fn push(&mut self, mut nodes: Vec<Node>, blocks: Vec<Block>) -> Reference {
+        let [first_node, first_block] = self.counts;
+        for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
+            *child += match *child {
+                INSTANCE.. => 0,
+                LEAF.. => first_block,
+                _ => first_node,
+            };
+        }
+        self.counts = [first_node + nodes.len() as u32, first_block + blocks.len() as u32];
+        self.nodes.push(nodes);
+        self.blocks.push(blocks);
+        first_node
+    }
+}
+
+/// A subtree that is written by itself.
+struct Subtree {
+    /// Of its root in the binary tree.
+    index: u32,
+    /// Whose child it is, and which.
+    parent: Reference,
+    lane: usize,
 }
 
 /// Writes a wide tree.
 struct Collapse<'a> {
     items: &'a Items<'a>,
     binary: &'a Bvh2,
-    costs: &'a [SubtreeCosts],
-    written: &'a mut Written,
+    weighing: &'a Weighing<'a>,
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+    /// Nodes at this depth are left to others...
+    levels: usize,
+    /// ...which are these.
+    subtrees: Vec<Subtree>,
 }
 
-impl Collapse<'_> {
-    fn root(&mut self) -> Reference {
+impl<'a> Collapse<'a> {
+    fn new(weighing: &'a Weighing<'a>, levels: usize) -> Self {
+        let (nodes, blocks, subtrees) = Default::default();
+        let &Weighing { items, binary, .. } = weighing;
+        Self { items, binary, weighing, nodes, blocks, levels, subtrees }
+    }
+
+    fn root(&mut self) {
         let instance = self.items.instance_of(self.binary, 0);
-        if instance.is_none() && self.costs[0].count as usize > WIDTH {
-            return self.node(0, 0);
+        if instance.is_none() && !self.weighing.choices(0).is_block() {
+            self.node(0, 0);
+            return;
         }
         let reference = self.reserve();
         let child = instance.unwrap_or_else(|| self.block_of(0));
-        self.written.nodes[reference as usize].set_child(0, bounds(self.binary, 0), child);
-        reference
+        self.nodes[reference as usize].set_child(0, bounds(self.binary, 0), child);
     }
 
     /// Emits the node that stands for the binary inner node `index`.
@@ -167,14 +166,17 @@ impl Collapse<'_> {
         for (lane, &child) in children.iter().enumerate() {
             let target = if let Some(instance) = self.items.instance_of(self.binary, child) {
                 instance
-            } else if self.is_block(child) {
+            } else if self.weighing.choices(child).is_block() {
                 self.block_of(child)
+            } else if depth + 1 == self.levels {
+                self.subtrees.push(Subtree { index: child, parent: reference, lane });
+                0
             } else {
                 self.node(child, depth + 1)
             };
             node.set_child(lane, bounds(self.binary, child), target);
         }
-        self.written.nodes[reference as usize] = node;
+        self.nodes[reference as usize] = node;
         reference
     }
 
@@ -183,8 +185,12 @@ impl Collapse<'_> {
     /// Traversal Order for Shadow Ray Tracing*, CGF 33(6), 2014).
     fn sort_by_blocking(&self, children: &mut [u32]) {
         let half_area = |child: u32| self.binary.nodes[child as usize].aabb().half_area();
+        let is_block = |child: u32| {
+            self.weighing.choices(child).is_block()
+                && self.items.instance_of(self.binary, child).is_none()
+        };
         children.sort_by(|&a, &b| {
-            let triangles_last = self.is_block(a).cmp(&self.is_block(b));
+            let triangles_last = is_block(a).cmp(&is_block(b));
             triangles_last.then(half_area(a).total_cmp(&half_area(b)))
         });
     }
@@ -192,28 +198,13 @@ impl Collapse<'_> {
     /// Collects the binary nodes that become the children of a wide node, by least cost.
     fn open(&self, index: u32, slots: usize, children: &mut Vec<u32>) {
         let left = self.binary.nodes[index as usize].first_index;
-        let pair = [left, left + 1];
-        let [a, b] = pair.map(|child| &self.costs[child as usize]);
-        let taken = SubtreeCosts::split(a, b, slots).1;
-        for (child, mut slots) in pair.into_iter().zip([taken, slots - taken]) {
-            let costs = &self.costs[child as usize];
-            // Slots that do not lower the cost stay unused.
-            while slots > 1 && costs.forest[slots - 1] >= costs.forest[slots - 2] {
-                slots -= 1;
-            }
-            if slots == 1 {
-                children.push(child);
-            } else {
-                self.open(child, slots, children);
+        let of_left = self.weighing.choices(index).of_left(slots);
+        for (child, slots) in [(left, of_left), (left + 1, slots - of_left)] {
+            match self.weighing.choices(child).used(slots) {
+                1 => children.push(child),
+                used => self.open(child, used, children),
             }
         }
-    }
-
-    /// Whether a subtree that takes one slot is cheaper as a block than as a node.
-    fn is_block(&self, index: u32) -> bool {
-        let node = &self.binary.nodes[index as usize];
-        let costs = &self.costs[index as usize];
-        costs.count as usize <= WIDTH && costs.forest[0] >= node.aabb().half_area() * BLOCK_COST
     }
 
     fn block_of(&mut self, index: u32) -> Reference {
@@ -240,14 +231,13 @@ impl Collapse<'_> {
             let (bounds, child) = self.balanced(chunk, depth + 1);
             node.set_child(lane, bounds, child);
         }
-        self.written.nodes[reference as usize] = node;
+        self.nodes[reference as usize] = node;
         (bounds, reference)
     }
 
     fn reserve(&mut self) -> Reference {
-        let nodes = &mut self.written.nodes;
-        nodes.push(Node::EMPTY);
-        Reference::try_from(nodes.len() - 1).expect("fewer nodes than triangles")
+        self.nodes.push(Node::EMPTY);
+        Reference::try_from(self.nodes.len() - 1).expect("fewer nodes than triangles")
     }
 
     fn block(&mut self, primitives: &[u32]) -> Reference {
@@ -256,9 +246,8 @@ impl Collapse<'_> {
             let triangle = self.items.triangles[primitive as usize];
             block.set_triangle(lane, self.items.sources.vertices(triangle), triangle);
         }
-        let blocks = &mut self.written.blocks;
-        blocks.push(block);
-        Reference::try_from(blocks.len() - 1).expect("fewer blocks than triangles") | LEAF
+        self.blocks.push(block);
+        Reference::try_from(self.blocks.len() - 1).expect("fewer blocks than triangles") | LEAF
     }
 
     /// The primitives below a node of the binary tree, left to right.

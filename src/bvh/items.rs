@@ -80,7 +80,6 @@ impl<'a> Items<'a> {
         if count == 0 {
             return None;
         }
-        let boxes: Vec<Aabb> = (0..count).into_par_iter().map(|i| self.aabb(i)).collect();
         // One item a leaf: the collapse below forms the leaves. Without pre-splits (which
         // `build_bvh2` never does) each is referenced once, as `any_hit` promises.
         let parameters = BvhBuildParams {
@@ -88,13 +87,13 @@ impl<'a> Items<'a> {
             post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
             ..BvhBuildParams::medium_build()
         };
-        let loosened: Vec<Aabb> =
-            boxes.par_iter().zip(0..count).map(|(tight, i)| loosened(tight, i)).collect();
-        let mut binary = build_bvh2(&loosened, parameters, &mut Duration::default());
+        let boxes = (0..count).into_par_iter().map(|i| loosened(&self.aabb(i), i));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let mut binary = build_bvh2(&boxes, parameters, &mut Duration::default());
         let (nodes, primitives) = (&mut binary.nodes, &binary.primitive_indices);
-        for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
-            node.set_aabb(boxes[primitives[node.first_index as usize] as usize]);
-        }
+        nodes.par_iter_mut().filter(|node| node.is_leaf()).for_each(|node| {
+            node.set_aabb(self.aabb(primitives[node.first_index as usize]));
+        });
         binary.refit_all();
         Some(binary)
     }

@@ -12,6 +12,7 @@ mod ray;
 mod traverse;
 mod tree;
 mod triangle;
+mod weighing;
 mod wide;
 
 #[cfg(target_arch = "x86_64")]

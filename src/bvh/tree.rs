@@ -12,7 +12,6 @@ use super::lanes::Portable;
 use super::ray::{Hit, Ray};
 use super::traverse::{self, TreeRef};
 use super::wide::{Block, Node, Reference};
-use crate::huge_pages::on_huge_pages;
 
 /// Which instructions the walk uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,15 +59,7 @@ impl Bvh {
         let build::Tree { nodes, blocks, placed, root, bounds } =
             build::build(positions, triangles, shared);
         let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-        Self {
-            nodes: on_huge_pages(nodes),
-            blocks: on_huge_pages(blocks),
-            placed,
-            root,
-            bounds,
-            extent,
-            simd: Simd::detect(),
-        }
+        Self { nodes, blocks, placed, root, bounds, extent, simd: Simd::detect() }
     }
 
     /// This tree, walked without special instructions; for comparison.

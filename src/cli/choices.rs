@@ -177,7 +177,6 @@ choices! {
     TileView {
         Energy = "energy": "Share of the map's energy"
         Learned = "learned": "Share of what all cells together have learned to sample"
-        EqualEnergy = "equal-energy": "Tiles of equal energy, which are not used"
     }
 }
 

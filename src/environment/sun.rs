@@ -172,67 +172,6 @@ impl Cone {
     }
 }
 
-/// `count` rectangles of texels, `[left, top, right, bottom)`, of nearly equal energy by repeated halving;
-/// fewer if the map has too few lit texels. For display only: the method uses tiles of equal size, since the
-/// smallest of these rectangles lie at the sun and do not separate parts of the sky.
-pub fn equal_energy_tiles(map: &Image, count: usize) -> Vec<[u32; 4]> {
-    let energies: Vec<f64> = map
-        .pixels
-        .iter()
-        .enumerate()
-        .map(|(i, rgb)| {
-            let row = (i / map.width as usize) as u32;
-            f64::from(luminance((*rgb).into())) * texel_solid_angle(map.width, map.height, row)
-        })
-        .collect();
-    let energy = |[left, top, right, bottom]: [u32; 4]| -> f64 {
-        let row = |y: u32| {
-            let start = (y * map.width) as usize;
-            energies[start + left as usize..start + right as usize].iter().sum::<f64>()
-        };
-        (top..bottom).map(row).sum()
-    };
-    let whole = [0, 0, map.width, map.height];
-    let mut tiles = vec![(energy(whole), whole)];
-    while tiles.len() < count {
-        let Some(at) = (0..tiles.len())
-            .filter(|i| tiles[*i].0 > 0.0 && is_divisible(tiles[*i].1))
-            .max_by(|a, b| tiles[*a].0.total_cmp(&tiles[*b].0))
-        else {
-            break;
-        };
-        let (total, tile) = tiles.swap_remove(at);
-        let halves = halved(tile, total, energy);
-        tiles.extend(halves.map(|half| (energy(half), half)));
-    }
-    tiles.into_iter().map(|(_, tile)| tile).collect()
-}
-
-fn is_divisible([left, top, right, bottom]: [u32; 4]) -> bool {
-    right - left > 1 || bottom - top > 1
-}
-
-/// Cuts the longer side where the energy is halved best.
-fn halved(tile: [u32; 4], total: f64, energy: impl Fn([u32; 4]) -> f64) -> [[u32; 4]; 2] {
-    let axis = usize::from(tile[3] - tile[1] > tile[2] - tile[0]);
-    let cut_at = |cut: u32| {
-        let (mut low, mut high) = (tile, tile);
-        (low[axis + 2], high[axis]) = (cut, cut);
-        [low, high]
-    };
-    let (mut sum, mut best) = (0.0, (f64::INFINITY, tile[axis] + 1));
-    for cut in tile[axis] + 1..tile[axis + 2] {
-        let mut slice = tile;
-        (slice[axis], slice[axis + 2]) = (cut - 1, cut);
-        sum += energy(slice);
-        let imbalance = (sum - 0.5 * total).abs();
-        if imbalance < best.0 {
-            best = (imbalance, cut);
-        }
-    }
-    cut_at(best.1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,20 +222,5 @@ mod tests {
             assert_eq!(changed, map);
         }
         assert_eq!(with_sun(Image::filled(8, 4, [0.0; 3]), 3.0), Image::filled(8, 4, [0.0; 3]));
-    }
-
-    #[test]
-    fn tiles_of_equal_energy_cover_the_map_once_and_are_small_at_the_sun() {
-        let map = map(|x, y| if x.abs_diff(20) < 2 && y.abs_diff(9) < 2 { 500.0 } else { 1.0 });
-        let tiles = equal_energy_tiles(&map, 64);
-        assert_eq!(tiles.len(), 64);
-        let area = |t: &[u32; 4]| (t[2] - t[0]) * (t[3] - t[1]);
-        assert_eq!(tiles.iter().map(area).sum::<u32>(), 64 * 32);
-        let at = |x: u32, y: u32| {
-            let holds = |t: &&[u32; 4]| t[0] <= x && x < t[2] && t[1] <= y && y < t[3];
-            tiles.iter().find(holds).map(area)
-        };
-        assert!(at(20, 9) < at(50, 25));
-        assert_eq!(equal_energy_tiles(&map, 1), [[0, 0, 64, 32]]);
     }
 }

@@ -64,10 +64,6 @@ fn overlays_and_panels_look_as_they_did() {
             "panel-tiles-learned".to_owned(),
             Interface { tiles: TileView::Learned, ..inspect.clone() },
         ),
-        (
-            "panel-tiles-equal-energy".to_owned(),
-            Interface { tiles: TileView::EqualEnergy, ..inspect.clone() },
-        ),
         ("panel-shortcuts".to_owned(), Interface { shortcuts: true, ..base.clone() }),
         ("panel-none".to_owned(), Interface { panels: false, ..base }),
     ];

@@ -34,7 +34,6 @@ pub(in crate::app) fn show(
     let energies: Vec<f32> =
         map.environment.tile_energies().iter().map(|energy| *energy as f32).collect();
     match (interface.tiles, inspector.learned()) {
-        (TileView::EqualEnergy, _) => equal_energy(ui, map),
         (TileView::Learned, Some(sums)) => tiles(ui, interface, map, size, &shares(sums)),
         (TileView::Learned, None) => {
             tiles(ui, interface, map, size, &[]);
@@ -48,7 +47,7 @@ pub(in crate::app) fn show(
     }
     if let Some(tile) = interface.tile {
         chosen_tile(ui, interface, size, tile, &shares(&energies));
-    } else if interface.tiles != TileView::EqualEnergy {
+    } else {
         ui.label(theme::quiet("Click a tile to see which cells sample it."));
     }
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
@@ -87,14 +86,9 @@ pub(in crate::app) fn show(
 }
 
 fn tile_views(ui: &mut Ui, interface: &mut Interface) {
-    const VIEWS: [(TileView, &str, &str); 3] = [
+    const VIEWS: [(TileView, &str, &str); 2] = [
         (TileView::Energy, "Energy", "Share of the map's energy in each tile"),
         (TileView::Learned, "Learned", "Learned probability of each tile, summed over all cells"),
-        (
-            TileView::EqualEnergy,
-            "Equal energy",
-            "Tiles of equal energy, for comparison only: they crowd around the sun, and large ones cannot tell which part of the sky is seen",
-        ),
     ];
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -102,21 +96,6 @@ fn tile_views(ui: &mut Ui, interface: &mut Interface) {
             ui.selectable_value(&mut interface.tiles, view, name).on_hover_text(hint);
         }
     });
-}
-
-/// The borders of tiles of equal energy.
-fn equal_energy(ui: &mut Ui, map: &LoadedMap) {
-    let (rect, response) = map_view::ground(ui, map);
-    let scale = rect.size() / Vec2::new(map.preview.width as f32, map.preview.height as f32);
-    let painter = ui.painter_at(rect);
-    let stroke = Stroke::new(0.6, theme::ACCENT);
-    for [left, top, right, bottom] in map.equal_energy.iter() {
-        let corner = |x: u32, y: u32| rect.min + Vec2::new(x as f32, y as f32) * scale;
-        let tile = Rect::from_min_max(corner(*left, *top), corner(*right, *bottom));
-        painter.rect_stroke(tile, 0.0, stroke, StrokeKind::Middle);
-    }
-    let count = map.equal_energy.len();
-    response.on_hover_text(format!("{count} tiles of equal energy, for comparison only"));
 }
 
 fn sun_sentence(sun: &Sun, rotation_turns: f32) -> String {
