@@ -49,6 +49,16 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
             return Err(Error::at(name, scene.without_material(material)));
         }
     }
+    for (lamp, edit) in &options.lamp_edits {
+        let mut is_there = false;
+        for changed in scene.lights.iter_mut().filter(|light| light.name == *lamp) {
+            *changed = edit.apply(changed);
+            is_there = true;
+        }
+        if !is_there {
+            return Err(Error::at(name, scene.without_lamp(lamp)));
+        }
+    }
     if options.edits.iter().any(|(_, edit)| edit.hidden) {
         scene.check_shown().at(name)?;
     }

@@ -10,7 +10,9 @@ use crate::denoise::Denoiser;
 use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Crop, Sampling, Sharing, StopRule, View};
-use crate::scene::{Camera, Material, MaterialEdit, Medium, Projection, builtin};
+use crate::scene::{
+    Camera, LampEdit, LampEdits, Material, MaterialEdit, Medium, Projection, builtin,
+};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 with_defaults! {
@@ -30,6 +32,8 @@ with_defaults! {
         pub sun: f32 = 1.0,
         /// Factor on the scene's point, spot and directional lights.
         pub lamps: f32 = 1.0,
+        /// Changes to these lights one by one.
+        pub lamp_edits: LampEdits = LampEdits::new(),
         /// What the camera sees of the map.
         pub background: Background = Background::default(),
         /// Fog in place of the scene's own; `None` keeps that.
@@ -99,6 +103,17 @@ impl Look {
     }
 }
 
+/// What a document changes of its scene's file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneChanges {
+    /// Changes to its materials, by their number.
+    pub materials: BTreeMap<u32, MaterialEdit>,
+    /// Factor on its point, spot and directional lights.
+    pub lamps: f32,
+    /// Changes to these lights one by one.
+    pub lamp_edits: LampEdits,
+}
+
 /// Size of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PictureSize {
@@ -137,12 +152,12 @@ impl Document {
             && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
             && self.region.iter().flatten().all(|share| (-MAX_ASIDE..=MAX_ASIDE).contains(share))
             && self.materials.values().all(MaterialEdit::is_sound)
+            && self.lamp_edits.values().all(LampEdit::is_sound)
     }
 
     /// Whether both show the same from the same place, whatever is made of it.
     pub(super) fn shows_like(&self, other: &Self) -> bool {
-        let light =
-            |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.lamps, of.light.bounces);
+        let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
         let things = |of: &Self| (of.background, of.fog);
         let cameras = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::camera));
         let is_seen_alike = match &cameras {
@@ -151,8 +166,20 @@ impl Document {
         };
         (&self.scene, &self.map) == (&other.scene, &other.map)
             && is_seen_alike
-            && self.materials == other.materials
+            && self.changes() == other.changes()
             && (light(self), things(self)) == (light(other), things(other))
+    }
+
+    /// What it changes of the scene's file.
+    pub(super) fn changes(&self) -> SceneChanges {
+        let Self { materials, lamps, lamp_edits, .. } = self.clone();
+        SceneChanges { materials, lamps, lamp_edits }
+    }
+
+    /// Changes that of the scene's file, and nothing else.
+    pub(super) fn set_changes(&mut self, changes: SceneChanges) {
+        let SceneChanges { materials, lamps, lamp_edits } = changes;
+        (self.materials, self.lamps, self.lamp_edits) = (materials, lamps, lamp_edits);
     }
 
     /// Keeps to the same materials, by their names, where a scene has come anew; those that lost theirs are told.

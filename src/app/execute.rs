@@ -26,7 +26,7 @@ use crate::image::{Image, read_picture};
 use crate::render::gpu::DeviceChoice;
 use crate::render::sun_placement::SunPlacement;
 use crate::render::surface_map::look_at_place;
-use crate::scene::builtin;
+use crate::scene::{LampEdits, builtin};
 use crate::sources;
 use crate::tone::display_rgb8;
 
@@ -256,6 +256,7 @@ impl App {
             map,
             materials: BTreeMap::new(),
             lamps: 1.0,
+            lamp_edits: LampEdits::new(),
             region: None,
             fog: None,
             ..document.clone()

@@ -1,11 +1,11 @@
 //! Reads scenes and maps beside the window: a large file never holds it up.
 
-use std::collections::BTreeMap;
+use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
-use super::document::Document;
+use super::document::{Document, SceneChanges};
 use super::threads::{Wake, lock, spawn};
 use crate::environment::sun::{Sun, SunTexels};
 use crate::environment::{Environment, EnvironmentOptions};
@@ -14,7 +14,7 @@ use crate::image::{Image, catch_panic};
 use crate::memory;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Material, MaterialEdit, PunctualLight, SceneOptions};
+use crate::scene::{Material, PunctualLight, SceneOptions};
 use crate::sources;
 
 /// A scene ready for rays.
@@ -24,14 +24,14 @@ pub struct LoadedScene {
     pub name: String,
     /// The scene, with these changes.
     pub world: Arc<World>,
-    /// Changes to its materials, by their number.
-    pub edits: BTreeMap<u32, MaterialEdit>,
-    /// Factor on its point, spot and directional lights.
-    pub lamps: f32,
+    /// What they are.
+    pub changes: SceneChanges,
     /// Its materials without them.
     pub materials: Arc<[Material]>,
-    /// Its lights without the factor.
-    lights: Arc<[PunctualLight]>,
+    /// Its point, spot and directional lights without them.
+    pub lights: Arc<[PunctualLight]>,
+    /// The first of these of each name.
+    pub named_lamps: Arc<[PunctualLight]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
@@ -52,26 +52,27 @@ impl LoadedScene {
 
     /// Whether its materials and lights are as the document wants them.
     pub(super) fn is_edited_as(&self, document: &Document) -> bool {
-        (&self.edits, self.lamps) == (&document.materials, document.lamps)
+        self.changes == document.changes()
     }
 
-    /// The same with these changes and this factor in place of those that there are.
-    fn edited(self, edits: BTreeMap<u32, MaterialEdit>, lamps: f32) -> Result<Self> {
+    /// The same with these changes in place of those that there are.
+    fn edited(self, changes: SceneChanges) -> Result<Self> {
         let mut materials = self.materials.to_vec();
-        for (number, edit) in &edits {
+        for (number, edit) in &changes.materials {
             if let Some(material) = materials.get_mut(*number as usize) {
                 *material = edit.apply(material);
             }
         }
-        let scaled = |light: &PunctualLight| PunctualLight {
-            intensity: light.intensity * lamps,
-            ..light.clone()
+        let changed = |light: &PunctualLight| {
+            let edit = changes.lamp_edits.get(&light.name).copied().unwrap_or_default();
+            let light = edit.apply(light);
+            PunctualLight { intensity: light.intensity * changes.lamps, ..light }
         };
-        let world = self.world.with_looks(materials, self.lights.iter().map(scaled).collect());
+        let world = self.world.with_looks(materials, self.lights.iter().map(changed).collect());
         let world =
             world.map_err(|cause| Error::at(&self.name, format!("to change it {cause}")))?;
         let world = Arc::new(world);
-        Ok(Self { kernel: KernelFacts::of_scene(&world), world, edits, lamps, ..self })
+        Ok(Self { kernel: KernelFacts::of_scene(&world), world, changes, ..self })
     }
 }
 
@@ -238,10 +239,8 @@ impl Loader {
     /// Starts to change the materials and lights of a scene that is there to what the document wants, unless something
     /// is being done to it.
     pub fn edit_scene(&mut self, scene: &LoadedScene, document: &Document) {
-        let (own, edits, lamps) = (scene.clone(), document.materials.clone(), document.lamps);
-        self.spawn(Kind::Scene, &scene.name, true, move |_| {
-            Loaded::Edited(own.edited(edits, lamps))
-        });
+        let (own, changes) = (scene.clone(), document.changes());
+        self.spawn(Kind::Scene, &scene.name, true, move |_| Loaded::Edited(own.edited(changes)));
     }
 
     /// Starts to load a map unless it is being loaded; a change to its sun is given up.
@@ -332,7 +331,9 @@ fn load_scene(name: &str, options: &SceneOptions, steps: &Steps) -> Result<Loade
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let kernel = KernelFacts::of_scene(&world);
     let materials = world.scene.materials.clone().into();
-    let lights = world.scene.lights.clone().into();
-    let (name, edits, lamps) = (name.to_owned(), BTreeMap::new(), 1.0);
-    Ok(LoadedScene { name, world, edits, lamps, materials, lights, kernel, seconds })
+    let lights: Arc<[PunctualLight]> = world.scene.lights.clone().into();
+    let mut names = HashSet::new();
+    let named_lamps = lights.iter().filter(|light| names.insert(&light.name)).cloned().collect();
+    let (name, changes) = (name.to_owned(), Document::default().changes());
+    Ok(LoadedScene { name, world, changes, materials, lights, named_lamps, kernel, seconds })
 }

@@ -112,20 +112,27 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
 
 /// Changes to materials, as `--material` reads them.
 fn edits(picture: &Picture) -> Vec<String> {
-    let LoadedScene { edits, materials, .. } = &picture.scene;
+    let LoadedScene { changes, materials, .. } = &picture.scene;
     let name = |number: &u32| Some(&materials.get(*number as usize)?.name);
-    edits.iter().filter_map(|(number, edit)| Some(edit.to_text(name(number)?))).collect()
+    changes
+        .materials
+        .iter()
+        .filter_map(|(number, edit)| Some(edit.to_text(name(number)?)))
+        .collect()
 }
 
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let document = &picture.document;
     let request = &picture.snapshot.request;
     let mut settings = settings_of(&request.view, &request.world);
+    let lamp_edits = document.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
+    let lamp_edits: Vec<String> = lamp_edits.collect();
     settings.extend([
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
         ("env_sun", json!(document.sun)),
         ("lamps_factor", json!(document.lamps)),
+        ("lamp_edits", json!(lamp_edits)),
         ("materials", json!(edits(picture))),
     ]);
     settings

@@ -37,10 +37,8 @@ impl App {
                 Loaded::Edited(Err(error)) => {
                     self.messages.error(error.to_string());
                     if let Some(scene) = &self.assets.scene {
-                        let (edits, lamps) = (scene.edits.clone(), scene.lamps);
-                        self.edited.put_back(|document| {
-                            (document.materials, document.lamps) = (edits, lamps);
-                        });
+                        let changes = scene.changes.clone();
+                        self.edited.put_back(|document| document.set_changes(changes));
                     }
                 }
                 Loaded::Map(Ok(map)) => self.take_map(map),
@@ -331,6 +329,7 @@ pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Libr
         return;
     };
     if before.scene == scene.name {
+        document.set_changes(before.changes());
         // The sky that came with the other one goes with it; a map that somebody chose stays.
         if sources::is_built_in_scene(&document.scene) {
             document.map = before.map;
@@ -339,15 +338,13 @@ pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Libr
         document.viewpoint = before.viewpoint;
         document.bookmarks = before.bookmarks;
         (document.region, document.fog) = (before.region, before.fog);
-        (document.materials, document.lamps) = (before.materials, before.lamps);
     } else {
         // Somebody went back to a file that is no longer there.
         edited.amend(|document| {
             document.scene.clone_from(&scene.name);
             document.viewpoint = Some(first_viewpoint(scene));
             document.bookmarks = library.settings.viewpoints_of(&scene.name);
-            document.materials.clone_from(&scene.edits);
-            document.lamps = scene.lamps;
+            document.set_changes(scene.changes.clone());
         });
     }
 }

@@ -22,7 +22,7 @@ use crate::memory;
 use crate::path::Background;
 use crate::render::StopRule;
 use crate::render::gpu::DeviceChoice;
-use crate::scene::{MaterialEdit, Medium};
+use crate::scene::{LampEdit, MaterialEdit, Medium};
 use crate::tone::WhiteBalance;
 
 fn studio(scene: &str) -> Option<Studio> {
@@ -385,6 +385,15 @@ fn lamps_are_scaled_apart_from_the_map() {
         scene.lights[0].intensity.x
     };
     assert_eq!([1.0, 0.25, 2.0].map(|lamps| candela(&mut studio, lamps)), [8.0, 2.0, 16.0]);
+    // Its own change multiplies that, and the list has its name.
+    let own = LampEdit { factor: 0.5, ..LampEdit::default() };
+    let name = studio.app.assets.scene.as_ref().expect("it is there").named_lamps[0].name.clone();
+    studio.app.edited.document.lamp_edits.insert(name.clone(), own);
+    assert_eq!(candela(&mut studio, 2.0), 8.0);
+    let off = LampEdit { off: true, ..own };
+    studio.app.edited.document.lamp_edits.insert(name.clone(), off);
+    assert_eq!(candela(&mut studio, 2.0), 0.0);
+    studio.app.edited.document.lamp_edits.remove(&name);
     // A change of a material keeps the factor.
     let edit = MaterialEdit { roughness: Some(0.25), ..MaterialEdit::default() };
     studio.app.edited.document.materials.insert(0, edit);

@@ -14,7 +14,7 @@ use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Gi, Sampling, Sharing};
 #[cfg(feature = "report")]
 use crate::report::Device;
-use crate::scene::{Lamps, MaterialEdit, Outlines, SceneOptions};
+use crate::scene::{LampEdit, Lamps, MaterialEdit, Outlines, SceneOptions};
 use crate::tone::ToneCurve;
 
 /// What is asked of a scene's file.
@@ -41,6 +41,10 @@ pub(super) struct SceneArguments {
     /// multiplies its texture), emission-color=#rrggbb, or hidden; may be given several times.
     #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse, help_heading = "Scene")]
     edits: Vec<(String, MaterialEdit)>,
+    /// Changes all point, spot and directional lights of a name: factor=NUMBER, color=#rrggbb, or off; may be given
+    /// several times.
+    #[arg(long = "lamp", value_name = "NAME:CHANGES", value_parser = LampEdit::parse, help_heading = "Scene")]
+    lamp_edits: Vec<(String, LampEdit)>,
 }
 
 impl SceneArguments {
@@ -49,14 +53,20 @@ impl SceneArguments {
         self.edits.iter().map(|(name, edit)| edit.to_text(name)).collect()
     }
 
+    /// Changes to lamps, as they were typed.
+    pub(super) fn lamp_edits(&self) -> Vec<String> {
+        self.lamp_edits.iter().map(|(name, edit)| edit.to_text(name)).collect()
+    }
+
     pub(super) fn options(&self) -> SceneOptions {
         self.options_beside(Vec::new())
     }
 
     /// The same where these files will be written.
     pub(super) fn options_beside(&self, outputs: Vec<PathBuf>) -> SceneOptions {
-        let Self { allow_outside, variant, outlines, lamps, hide, edits } = self.clone();
-        SceneOptions { allow_outside, variant, outlines, lamps, hide, edits, outputs }
+        let Self { allow_outside, variant, outlines, lamps, hide, edits, lamp_edits } =
+            self.clone();
+        SceneOptions { allow_outside, variant, outlines, lamps, hide, edits, lamp_edits, outputs }
     }
 }
 

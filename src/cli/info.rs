@@ -60,6 +60,7 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
         "bvh_bytes": world.bvh.memory_bytes(),
         "emissive_triangles": world.lights.triangle_count(),
         "punctual_lights": scene.lights.len(),
+        "punctual_light_names": scene.lights.iter().map(|light| light.name.as_str()).collect::<Vec<_>>(),
         "size_metres": (high - low).to_array().map(|length| scene.frame.length_in_file(length)),
         "cameras": scene.cameras.iter().enumerate().map(|(i, camera)| {
             let view = match camera.projection {

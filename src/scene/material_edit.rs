@@ -142,12 +142,16 @@ impl MaterialEdit {
 }
 
 /// A color as bright as it can be; `None` for black.
-fn brightest(color: Vec3) -> Option<Vec3> {
+pub(super) fn brightest(color: Vec3) -> Option<Vec3> {
     let max = color.max_element();
     (max > 0.0).then(|| color / max)
 }
 
-fn number_up_to(max: f32, text: &str) -> Result<f32, String> {
+/// A number from 0 to `max`.
+///
+/// # Errors
+/// A sentence, if it is something else.
+pub(super) fn number_up_to(max: f32, text: &str) -> Result<f32, String> {
     let number: Option<f32> = text.trim().parse().ok();
     let number = number.filter(|number| (0.0..=max).contains(number));
     number.ok_or_else(|| format!("{text} is no number from 0 to {max}"))

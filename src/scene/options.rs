@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::lamp_edit::LampEdit;
 use super::material_edit::MaterialEdit;
 
 /// What is asked of a scene's file.
@@ -24,6 +25,8 @@ pub struct SceneOptions {
     pub hide: Vec<String>,
     /// Changes to all materials of a name, in order.
     pub edits: Vec<(String, MaterialEdit)>,
+    /// Changes to all point, spot and directional lights of a name, in order.
+    pub lamp_edits: Vec<(String, LampEdit)>,
     /// Files that will be written: a scene that names one of them as its own data is refused.
     #[serde(skip)]
     pub outputs: Vec<PathBuf>,

@@ -177,16 +177,12 @@ impl Scene {
 
     /// Says that no material is called so, and what there is instead.
     pub(crate) fn without_material(&self, name: &str) -> String {
-        const MAX_NAMED: usize = 12;
-        let mut names: Vec<&str> = self.materials.iter().map(|m| m.name.as_str()).collect();
-        names.sort_unstable();
-        names.dedup();
-        let more = match names.len().saturating_sub(MAX_NAMED) {
-            0 => String::new(),
-            count => format!(" and {count} more, which lightgrid info names"),
-        };
-        names.truncate(MAX_NAMED);
-        format!("no material is called \"{name}\"; there are {}{more}", names.join(", "))
+        none_called("material", name, self.materials.iter().map(|m| m.name.as_str()).collect())
+    }
+
+    /// The same of point, spot and directional lights.
+    pub(crate) fn without_lamp(&self, name: &str) -> String {
+        none_called("lamp", name, self.lights.iter().map(|light| light.name.as_str()).collect())
     }
 
     /// Whether anything is left to be shown: something that is not of a hidden material.
@@ -209,6 +205,20 @@ impl Scene {
         let keeps: Vec<bool> = self.triangle_materials.iter().map(keeps).collect();
         self.retain_triangles(|place| keeps[place]);
     }
+}
+
+/// Says that nothing of a kind is called so, and what there is instead.
+fn none_called(kind: &str, name: &str, mut names: Vec<&str>) -> String {
+    const MAX_NAMED: usize = 12;
+    names.sort_unstable();
+    names.dedup();
+    let more = match names.len().saturating_sub(MAX_NAMED) {
+        0 if names.is_empty() => "none".to_owned(),
+        0 => String::new(),
+        count => format!(" and {count} more, which lightgrid info names"),
+    };
+    names.truncate(MAX_NAMED);
+    format!("no {kind} is called \"{name}\"; there are {}{more}", names.join(", "))
 }
 
 #[cfg(test)]

@@ -910,3 +910,49 @@ fn a_reader_who_has_seen_enough_is_no_reason_to_panic() {
     let says = String::from_utf8_lossy(&output.stderr);
     assert!(!says.contains("panicked"), "{says}");
 }
+
+/// Lamps are dimmed, coloured and switched off by name, and light adds up.
+#[test]
+fn lamps_are_changed_by_name() {
+    let bench = Bench::new();
+    let lit = SCENE.replace(
+        r#"{"mesh": 0}"#,
+        r#"{"mesh": 0}, {"translation": [0, 2, 0], "name": "key", "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"translation": [1, 2, 1], "extensions": {"KHR_lights_punctual": {"light": 1}}}"#,
+    );
+    let lit = lit.replace(r#""nodes": [0]"#, r#""nodes": [0, 1, 2]"#).replacen(
+        r#""asset""#,
+        r#""extensionsUsed": ["KHR_lights_punctual"], "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "point", "intensity": 8}, {"type": "point", "name": "fill:warm", "intensity": 4}]}}, "asset""#,
+        1,
+    );
+    fs::write(bench.path("lit.gltf"), lit).expect("written");
+    let line = |rest: &str| {
+        format!(
+            "render lit.gltf --eye 0,3,3 --target 0,0,0 --env-intensity 0 --size 16x16 --spp 256 {rest}"
+        )
+    };
+    let mean = |rest: &str| {
+        let output = bench.run(&line(&format!("{rest} -o a.exr --json a.json")));
+        assert!(output.status.success(), "{rest}: {}", text(&output.stderr));
+        let picture = read_picture(&bench.path("a.exr")).expect("a picture");
+        [0, 2].map(|c| picture.pixels.iter().map(|pixel| f64::from(pixel[c])).sum::<f64>())
+    };
+    let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+    let [all, _] = mean("");
+    let [fill, blue] = mean("--lamp key:off");
+    near(fill, blue);
+    let [key, _] = mean("--lamp fill:warm:off");
+    near(key + fill, all);
+    let [dimmed, blue] = mean("--lamp fill:warm:off --lamp key:factor=0.5,color=#ff0000");
+    near(2.0 * dimmed, key);
+    assert_eq!(blue, 0.0);
+    let settings = &bench.json("a.json")["settings"]["lamp_edits"];
+    assert_eq!(settings[1], "key:factor=0.5,color=#ff0000");
+    let says = bench.refusal(&line("-o b.exr --lamp rim:off"), 1);
+    assert!(says.contains("no lamp is called \"rim\"; there are fill:warm, key"), "{says}");
+    let says = bench.refusal("render office -o b.exr --lamp rim:off", 1);
+    assert!(says.contains("no lamp is called \"rim\"; there are none"), "{says}");
+    let says = bench.refusal(&line("-o b.exr --lamp key:watts=3"), 2);
+    assert!(says.contains("watts is not factor, color or off"), "{says}");
+}

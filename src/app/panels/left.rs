@@ -1,16 +1,16 @@
-//! The left panel: scene, cameras, environment, fog, material. Where there is no room for it, the right one
+//! The left panel: scene, cameras, environment, lamps, fog, material. Where there is no room for it, the right one
 //! shows the same.
 
 use egui::{
-    Button, Margin, Panel, Response, RichText, ScrollArea, Slider, SliderClamping, TextureHandle,
-    Ui,
+    Button, Margin, Panel, Response, RichText, ScrollArea, SliderClamping, TextureHandle, Ui,
 };
 
 use glam::Vec3;
 
 use super::button::button;
 use super::controls::Controls;
-use super::{map_view, material};
+use super::late::{factor, late_factor};
+use super::{lamps, map_view, material};
 use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
@@ -58,6 +58,10 @@ pub(in crate::app) fn sections(ui: &mut Ui, controls: &mut Controls<'_>, sources
     theme::section(ui, "ENVIRONMENT");
     environment(ui, controls, sources);
     if let Some(scene) = sources.scene {
+        if !scene.lights.is_empty() {
+            theme::section(ui, "LAMPS");
+            lamps::show(ui, controls, scene);
+        }
         theme::section(ui, "FOG");
         fog(ui, &mut controls.document.fog, &scene.world.scene);
         theme::section(ui, "MATERIAL");
@@ -250,10 +254,6 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     let hint =
         "Brightness of the map's sun alone; its sky stays as it is. The picture starts again";
     late_factor(ui, "Sun", hint, &mut document.sun);
-    if sources.scene.is_some_and(|scene| !scene.world.scene.lights.is_empty()) {
-        let hint = "Brightness of the file's point, spot and directional lights";
-        late_factor(ui, "Lamps", hint, &mut document.lamps);
-    }
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
         let text = RichText::new("Reset rotation, intensity and sun").size(12.0);
@@ -261,27 +261,6 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
             (document.rotation_degrees, document.intensity, document.sun) = (0.0, 1.0, 1.0);
         }
     }
-}
-
-/// A factor that is taken up when the slider is let go: what it changes is built anew.
-fn late_factor(ui: &mut Ui, name: &str, hint: &str, result: &mut f32) {
-    theme::row(ui, name, hint, |ui| {
-        let id = ui.scope_id().with(name);
-        let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*result);
-        let response = ui.add(factor(&mut value));
-        if response.dragged() || response.has_focus() {
-            ui.data_mut(|data| data.insert_temp(id, value));
-        } else {
-            ui.data_mut(|data| data.remove::<f32>(id));
-            *result = value;
-        }
-    });
-}
-
-/// A slider for a factor on light.
-fn factor(value: &mut f32) -> Slider<'_> {
-    let slider = theme::slider(value, 0.0..=10.0).logarithmic(true);
-    slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ")
 }
 
 /// What the camera sees of the map; surfaces are lit by it in any case.

@@ -8,6 +8,8 @@ pub(super) mod dock;
 mod gestures;
 pub(super) mod history;
 pub(super) mod inspector;
+mod lamps;
+mod late;
 pub(super) mod left;
 mod map_view;
 mod material;

@@ -133,6 +133,7 @@ pub(super) fn settings(
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("env_sun", serde_json::json!(arguments.env_sun)),
         ("lamps", serde_json::json!(arguments.of_scene.options().lamps)),
+        ("lamp_edits", serde_json::json!(arguments.of_scene.lamp_edits())),
         ("materials", serde_json::json!(arguments.of_scene.edits())),
     ]);
     settings

@@ -258,7 +258,8 @@ fn identity(arguments: &RenderArguments, lit: Lit<'_>, view: &View) -> Vec<(Stri
     let (scene, map) = (&arguments.scene, arguments.map());
     let scene = match sources::is_built_in_scene(scene) {
         true => {
-            let changes = (arguments.of_scene.options().hide, arguments.of_scene.edits());
+            let of_scene = &arguments.of_scene;
+            let changes = (of_scene.options().hide, of_scene.edits(), of_scene.lamp_edits());
             format!("{scene} {}", Digest::new().debug(&changes).built_in_scene(&world.scene))
         }
         false => Digest::new().scene(&world.scene).to_string(),

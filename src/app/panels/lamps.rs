@@ -1,0 +1,70 @@
+//! Point, spot and directional lights: brightness of all, and each name's switch, colour and brightness.
+
+use std::ops::Range;
+
+use egui::{Align, DragValue, Label, Layout, RichText, ScrollArea, Ui, Vec2};
+use glam::Vec3;
+
+use super::controls::Controls;
+use super::late::{late, late_factor};
+use crate::app::loader::LoadedScene;
+use crate::scene::{LampEdit, PunctualLight};
+
+/// Most rows that are seen at once.
+const MAX_ROWS: usize = 8;
+/// Width of a name in points.
+const NAME_WIDTH: f32 = 102.0;
+
+/// Draws the section.
+pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
+    let Controls { document, interface, .. } = controls;
+    late_factor(ui, "All", "Brightness of all lamps", &mut document.lamps);
+    let before = document.lamp_edits.clone();
+    let mut rows = |ui: &mut Ui, rows: Range<usize>| {
+        for lamp in &scene.named_lamps[rows] {
+            let mut edit = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
+            ui.push_id(&lamp.name, |ui| row(ui, lamp, &mut edit));
+            document.lamp_edits.insert(lamp.name.clone(), edit);
+        }
+    };
+    match scene.named_lamps.len() {
+        count @ ..=MAX_ROWS => rows(ui, 0..count),
+        count => {
+            let height = ui.spacing().interact_size.y;
+            let list = ScrollArea::vertical().max_height(MAX_ROWS as f32 * height);
+            list.show_rows(ui, height, count, rows);
+        }
+    }
+    document.lamp_edits.retain(|_, edit| *edit != LampEdit::default());
+    let is_changed = document.lamps != 1.0 || !document.lamp_edits.is_empty();
+    if is_changed && ui.button(RichText::new("Reset lamps").size(12.0)).clicked() {
+        document.lamps = 1.0;
+        document.lamp_edits.clear();
+    }
+    if document.lamp_edits != before {
+        interface.keep_moving(ui.ctx());
+    }
+}
+
+fn row(ui: &mut Ui, lamp: &PunctualLight, edit: &mut LampEdit) {
+    ui.horizontal(|ui| {
+        let mut is_on = !edit.off;
+        ui.checkbox(&mut is_on, "").on_hover_text("On or off");
+        edit.off = !is_on;
+        let size = Vec2::new(NAME_WIDTH, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(NAME_WIDTH);
+            ui.add(Label::new(&lamp.name).truncate());
+        });
+        let own = lamp.intensity / lamp.intensity.max_element().max(f32::MIN_POSITIVE);
+        let mut rgb = edit.color.unwrap_or(own).to_array();
+        if ui.color_edit_button_rgb(&mut rgb).on_hover_text("Colour of its light").changed() {
+            edit.color = Some(Vec3::from(rgb).clamp(Vec3::ZERO, Vec3::ONE));
+        }
+        late(ui, "factor", &mut edit.factor, |ui, value| {
+            let range = 0.0..=LampEdit::MAX_FACTOR;
+            let number = DragValue::new(value).range(range).speed(0.02).max_decimals(2);
+            ui.add(number.prefix("× ")).on_hover_text("Brightness: drag, or click and type")
+        });
+    });
+}

@@ -1,0 +1,111 @@
+//! Changes to point, spot and directional lights after loading.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::light::PunctualLight;
+use super::material_edit::{brightest, color_of_hex, hex_of_color, number_up_to};
+
+/// Changes to lights, by their name.
+pub type LampEdits = BTreeMap<String, LampEdit>;
+
+with_defaults! {
+    /// A change to all lights of a name.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct LampEdit {
+        /// Whether they are switched off.
+        pub off: bool = false,
+        /// Factor on their intensity, `0..=MAX_FACTOR`.
+        pub factor: f32 = 1.0,
+        /// Their colour, linear RGB in `[0,1]`, in place of their own; its brightness is of no account.
+        pub color: Option<Vec3> = None,
+    }
+}
+
+impl LampEdit {
+    /// Largest factor that can be asked for.
+    pub const MAX_FACTOR: f32 = 1e6;
+
+    /// The light changed.
+    pub fn apply(&self, light: &PunctualLight) -> PunctualLight {
+        let factor = if self.off { 0.0 } else { self.factor };
+        let max = light.intensity.max_element();
+        let intensity = self.color.and_then(brightest).map_or(light.intensity, |color| color * max);
+        PunctualLight { intensity: intensity * factor, ..light.clone() }
+    }
+
+    /// Whether all numbers are in range.
+    pub fn is_sound(&self) -> bool {
+        let mut color = self.color.iter().flat_map(Vec3::to_array);
+        (0.0..=Self::MAX_FACTOR).contains(&self.factor) && color.all(|x| (0.0..=1.0).contains(&x))
+    }
+
+    /// Reads `NAME:CHANGES`: `factor=NUMBER`, `color=#rrggbb` (sRGB) and `off`, separated by commas.
+    ///
+    /// # Errors
+    /// The cause, without the text.
+    pub fn parse(text: &str) -> Result<(String, Self), String> {
+        let (name, changes) = text
+            .rsplit_once(':')
+            .ok_or("expected a lamp's name and changes, like Spot:factor=0.5,color=#ffd0a0")?;
+        let mut edit = Self::default();
+        for change in changes.split(',') {
+            match change.trim().split_once('=').unwrap_or((change.trim(), "")) {
+                ("off", "") => edit.off = true,
+                ("factor", value) => edit.factor = number_up_to(Self::MAX_FACTOR, value)?,
+                ("color", value) => edit.color = Some(color_of_hex(value.trim())?),
+                (other, _) => return Err(format!("{other} is not factor, color or off")),
+            }
+        }
+        Ok((name.to_owned(), edit))
+    }
+
+    /// As [`Self::parse`] reads it.
+    pub fn to_text(&self, name: &str) -> String {
+        let color = self.color.map(|color| format!(",color={}", hex_of_color(color)));
+        let off = if self.off { ",off" } else { "" };
+        format!("{name}:factor={}{}{off}", self.factor, color.unwrap_or_default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::PunctualKind;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        for text in ["Key: left:factor=0.25,color=#ffd0a0,off", "Spot:factor=1"] {
+            let (name, edit) = LampEdit::parse(text).expect("sound");
+            assert_eq!(edit.to_text(&name), text);
+            assert!(edit.is_sound());
+        }
+        let refused = |text: &str| LampEdit::parse(text).expect_err("refused");
+        assert!(refused("Spot").contains("expected a lamp's name"));
+        assert!(refused("Spot:power=1").contains("power is not factor"));
+        assert!(refused("Spot:factor=-1").contains("-1 is no number from 0 to 1000000"));
+        assert!(refused("Spot:off=1").contains("off is not factor"));
+    }
+
+    #[test]
+    fn a_lamp_is_dimmed_coloured_and_switched_off() {
+        let light = PunctualLight {
+            name: "Spot".to_owned(),
+            kind: PunctualKind::Point,
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Z,
+            intensity: Vec3::new(1.0, 4.0, 2.0),
+            range: f32::INFINITY,
+        };
+        let changed = |edit: LampEdit| edit.apply(&light).intensity;
+        let none = LampEdit::default();
+        assert_eq!(changed(none), light.intensity);
+        assert_eq!(changed(LampEdit { factor: 0.5, ..none }), Vec3::new(0.5, 2.0, 1.0));
+        let color = Some(Vec3::new(0.5, 0.25, 0.0));
+        assert_eq!(changed(LampEdit { color, ..none }), Vec3::new(4.0, 2.0, 0.0));
+        assert_eq!(changed(LampEdit { off: true, ..none }), Vec3::ZERO);
+    }
+}
