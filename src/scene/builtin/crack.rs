@@ -3,8 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
-use super::mesh::placed;
-use super::mesh::{Builder, Mat};
+use super::mesh::{Builder, Mat, placed};
 use super::objects;
 use super::room::{self, Hole, Shell};
 use super::textures;

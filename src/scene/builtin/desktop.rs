@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::mesh::placed;
-use super::mesh::{Builder, Mat};
+use super::mesh::{Builder, Mat, placed};
 use super::objects::COVERS;
 use crate::noise::Stream;
 

@@ -5,8 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Vec3};
 
-use super::mesh::placed;
-use super::mesh::{Builder, Mat};
+use super::mesh::{Builder, Mat, placed};
 
 /// A floor lamp: a curved arm over a heavy foot, and a linen drum shade.
 pub(super) fn arc_lamp(

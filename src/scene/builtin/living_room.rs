@@ -5,8 +5,7 @@ use glam::{Vec2, Vec3};
 
 use super::furniture;
 use super::materials::{self, embossed, matte, palette, textured, two_sided, varnished};
-use super::mesh::placed;
-use super::mesh::{Builder, LIFT, Mat};
+use super::mesh::{Builder, LIFT, Mat, placed};
 use super::objects;
 use super::plants;
 use super::reliefs;

@@ -4,8 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::mesh::placed;
-use super::mesh::{Builder, LIFT, Mat};
+use super::mesh::{Builder, LIFT, Mat, placed};
 use super::tableware::spline;
 use crate::noise::Stream;
 

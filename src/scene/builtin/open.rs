@@ -5,8 +5,7 @@ use std::f32::consts::TAU;
 use glam::{Affine3A, Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
-use super::mesh::placed;
-use super::mesh::{Builder, Mat};
+use super::mesh::{Builder, Mat, placed};
 use super::objects;
 use super::textures;
 use crate::scene::Scene;

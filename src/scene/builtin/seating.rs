@@ -4,8 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use super::mesh::placed;
-use super::mesh::{Builder, Mat};
+use super::mesh::{Builder, Mat, placed};
 use crate::noise::smoothstep;
 
 /// A sofa of `width` for `seats`, with loose cushions.
