@@ -11,14 +11,10 @@ pub(super) fn monitor(b: &mut Builder, body: Mat, screen: Mat, [width, height]: 
     b.slab(body, [-0.12, 0.0, -0.10], [0.12, 0.012, 0.09], 0.005);
     b.slab(body, [-0.03, 0.006, -0.075], [0.03, 0.36, -0.058], 0.006);
     b.part(placed([0.0, 0.13, -0.035], [-4.0, 0.0, 0.0]), |b| {
-        b.slab(body, [-0.5 * width, 0.0, -0.018], [0.5 * width, height, 0.006], 0.006);
+        let x = 0.5 * width;
+        b.slab(body, [-x, 0.0, -0.018], [x, height, 0.006], 0.006);
         b.slab(body, [-0.14, 0.08, -0.045], [0.14, height - 0.08, -0.012], 0.015);
-        b.slab(
-            screen,
-            [-0.5 * width + 0.008, 0.018, 0.0],
-            [0.5 * width - 0.008, height - 0.008, 0.0072],
-            0.0006,
-        );
+        b.slab(screen, [-x + 0.008, 0.018, 0.0], [x - 0.008, height - 0.008, 0.0072], 0.0006);
     });
 }
 

@@ -64,19 +64,11 @@ pub(super) fn house(
             b.part(wall.frame(), |b| front(b, m, [width, height], windows, side));
         }
     }
-    let over = 0.28;
-    b.slab(
-        m.trim,
-        [x0 - over, height - 0.22, z0 - over],
-        [x1 + over, height + 0.06, z1 + over],
-        0.03,
-    );
-    b.slab(
-        m.trim,
-        [x0 - 0.12, height - 0.42, z0 - 0.12],
-        [x1 + 0.12, height - 0.20, z1 + 0.12],
-        0.03,
-    );
+    for (over, bottom, top) in
+        [(0.28, height - 0.22, height + 0.06), (0.12, height - 0.42, height - 0.20)]
+    {
+        b.slab(m.trim, [x0 - over, bottom, z0 - over], [x1 + over, top, z1 + over], 0.03);
+    }
     b.slab(m.roof, [x0 + 0.1, height, z0 + 0.1], [x1 - 0.1, height + 0.5, z1 - 0.1], 0.05);
 }
 

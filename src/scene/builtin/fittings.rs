@@ -40,12 +40,8 @@ pub(super) fn window_frame(
 /// A window board that reaches into the room below a window.
 pub(super) fn window_board(b: &mut Builder, mat: Mat, hole: [f32; 4], thickness: f32) {
     let [u0, v0, u1, _] = hole;
-    b.slab(
-        mat,
-        [u0 + 0.002, v0 - 0.02, -thickness + 0.01],
-        [u1 - 0.002, v0 + 0.015, 0.0 + LIFT],
-        0.003,
-    );
+    let back = -thickness + 0.01;
+    b.slab(mat, [u0 + 0.002, v0 - 0.02, back], [u1 - 0.002, v0 + 0.015, LIFT], 0.003);
     b.slab(mat, [u0 - 0.06, v0 - 0.018, -0.01], [u1 + 0.06, v0 + 0.014, 0.07], 0.008);
 }
 
@@ -119,16 +115,12 @@ pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, heigh
     b.slab(leaf, [u + 0.003, 0.005, -0.01], [u + width - 0.003, height - 0.003, 0.010], 0.003);
     architrave(b, leaf, [u, 0.001, u + width, height]);
     let (stile, middle) = (0.11, 0.92);
+    let (u0, u1) = (u + stile, u + width - stile);
     for [v0, v1] in [[0.22, middle - 0.06], [middle + 0.06, height - 0.12]] {
         b.part(Affine3A::from_translation(Vec3::Z * 0.010), |b| {
-            panel_moulding(b, leaf, [u + stile, v0, u + width - stile, v1]);
+            panel_moulding(b, leaf, [u0, v0, u1, v1]);
         });
-        b.slab(
-            leaf,
-            [u + stile + 0.06, v0 + 0.06, 0.0],
-            [u + width - stile - 0.06, v1 - 0.06, 0.017],
-            0.007,
-        );
+        b.slab(leaf, [u0 + 0.06, v0 + 0.06, 0.0], [u1 - 0.06, v1 - 0.06, 0.017], 0.007);
     }
     let knob = Vec3::new(u + width - 0.06, 1.02, 0.012);
     b.part(Affine3A::from_translation(knob) * Affine3A::from_rotation_x(0.5 * PI), |b| {

@@ -12,13 +12,9 @@ use crate::noise::Stream;
 pub(super) fn table(b: &mut Builder, top: Mat, legs: Mat, [width, depth, height]: [f32; 3]) {
     let (x, z) = (0.5 * width, 0.5 * depth);
     b.slab(top, [-x, height - 0.032, -z], [x, height, z], 0.006);
-    b.slab(
-        legs,
-        [-x + 0.09, height - 0.10, -z + 0.08],
-        [x - 0.09, height - 0.028, -z + 0.10],
-        0.003,
-    );
-    b.slab(legs, [-x + 0.09, height - 0.10, z - 0.10], [x - 0.09, height - 0.028, z - 0.08], 0.003);
+    for (back, front) in [(-z + 0.08, -z + 0.10), (z - 0.10, z - 0.08)] {
+        b.slab(legs, [-x + 0.09, height - 0.10, back], [x - 0.09, height - 0.028, front], 0.003);
+    }
     for (sx, sz) in [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)] {
         let head = Vec3::new(sx * (x - 0.09), height - 0.02, sz * (z - 0.09));
         let foot = Vec3::new(sx * (x - 0.05), 0.0, sz * (z - 0.05));
@@ -134,18 +130,10 @@ pub(super) fn radiator(b: &mut Builder, enamel: Mat, width: f32, height: f32) {
             b.blob(enamel, Vec3::new(x, y, 0.065), Vec3::new(0.0275, 0.024, 0.055), [3.0, 2.5], 6);
         }
     }
-    b.rod(
-        enamel,
-        Vec3::new(-0.5 * width, 0.11, 0.065),
-        Vec3::new(-0.5 * width - 0.07, 0.11, 0.065),
-        0.011,
-    );
-    b.rod(
-        enamel,
-        Vec3::new(-0.5 * width - 0.06, 0.11, 0.065),
-        Vec3::new(-0.5 * width - 0.06, -0.01, 0.065),
-        0.009,
-    );
+    let end = -0.5 * width;
+    let pipe = |x: f32, y: f32| Vec3::new(x, y, 0.065);
+    b.rod(enamel, pipe(end, 0.11), pipe(end - 0.07, 0.11), 0.011);
+    b.rod(enamel, pipe(end - 0.06, 0.11), pipe(end - 0.06, -0.01), 0.009);
     for x in [-0.4 * width, 0.4 * width] {
         b.rod(enamel, Vec3::new(x, height - 0.1, 0.03), Vec3::new(x, height - 0.1, -0.05), 0.01);
     }
@@ -166,12 +154,8 @@ pub(super) fn rug(b: &mut Builder, pattern: Mat, fringe: Mat, [width, depth]: [f
         for i in 0..count {
             let z = ((i as f32 + 0.5) / count as f32 - 0.5) * depth * 0.99;
             let from = Vec3::new(side * (0.5 * width - 0.004), 0.005, z);
-            let to = from
-                + Vec3::new(
-                    side * stream.between(0.04, 0.06),
-                    -0.0035,
-                    stream.between(-0.012, 0.012),
-                );
+            let length = side * stream.between(0.04, 0.06);
+            let to = from + Vec3::new(length, -0.0035, stream.between(-0.012, 0.012));
             let path =
                 [(from, 0.003), (from.lerp(to, 0.5) + Vec3::Y * 0.001, 0.0026), (to, 0.0012)];
             b.tube(fringe, 5, &path);

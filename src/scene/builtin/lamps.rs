@@ -69,12 +69,8 @@ pub(super) fn pendant(
         outer.push((radius * c.max(0.07), radius * 0.75 * s - drop));
     }
     b.lathe(metal, 64, &outer);
-    b.drum(
-        metal,
-        [radius * 0.75 - drop - 0.01, radius * 0.75 - drop + 0.05],
-        [radius * 0.1, 0.012],
-        0.003,
-    );
+    let top = radius * 0.75 - drop;
+    b.drum(metal, [top - 0.01, top + 0.05], [radius * 0.1, 0.012], 0.003);
     let inner: Vec<(f32, f32)> =
         outer.iter().rev().map(|&(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius))).collect();
     b.lathe(inside, 64, &inner);
@@ -132,12 +128,8 @@ pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
         b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
         for k in 0..6 {
             let (s, c) = (k as f32 * PI / 3.0).sin_cos();
-            b.rod(
-                metal,
-                Vec3::new(0.10 * c, 0.0, 0.10 * s),
-                Vec3::new(0.192 * c, 0.40, 0.192 * s),
-                0.009,
-            );
+            let at = |radius: f32, y: f32| Vec3::new(radius * c, y, radius * s);
+            b.rod(metal, at(0.10, 0.0), at(0.192, 0.40), 0.009);
         }
         let profile = [
             (0.0, 0.395),

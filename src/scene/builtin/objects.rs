@@ -28,18 +28,13 @@ pub(super) const COVERS: [[f32; 3]; 12] = [
 fn book(b: &mut Builder, [cover, paper]: [Mat; 2], [t, h, d]: [f32; 3], stream: &mut Stream) {
     let tone = COVERS[stream.index(COVERS.len())];
     let shade = stream.between(0.75, 1.15);
+    let (x, z) = (0.5 * t, 0.5 * d);
     b.tinted(tone.map(|c| c * shade), |b| {
-        let (x, z) = (0.5 * t, 0.5 * d);
         b.slab(cover, [-x, 0.0, -z], [-x + 0.0025, h, z - 0.001], 0.0);
         b.slab(cover, [x - 0.0025, 0.0, -z], [x, h, z - 0.001], 0.0);
         b.slab(cover, [-x + 0.0002, 0.0003, z - 0.004], [x - 0.0002, h - 0.0003, z], 0.002);
     });
-    b.slab(
-        paper,
-        [-0.5 * t + 0.002, 0.003, -0.5 * d + 0.004],
-        [0.5 * t - 0.002, h - 0.004, 0.5 * d - 0.002],
-        0.0,
-    );
+    b.slab(paper, [-x + 0.002, 0.003, -z + 0.004], [x - 0.002, h - 0.004, z - 0.002], 0.0);
 }
 
 /// A row of books from x = 0 to `width`, no higher than `room`, spines at z = `depth` / 2.
@@ -61,12 +56,10 @@ pub(super) fn books(b: &mut Builder, mats: [Mat; 2], width: f32, room: f32, dept
         let back = stream.between(0.0, 0.02);
         let z = 0.5 * (depth - d) - back;
         b.part(placed([x + 0.5 * t, 0.0003, z], [0.0, 0.0, leaning]), |b| {
-            b.part(
-                Affine3A::from_translation(Vec3::Y * (0.5 * t * leaning.to_radians().sin())),
-                |b| {
-                    book(b, mats, [t, h, d], &mut stream);
-                },
-            );
+            let rise = 0.5 * t * leaning.to_radians().sin();
+            b.part(Affine3A::from_translation(Vec3::Y * rise), |b| {
+                book(b, mats, [t, h, d], &mut stream);
+            });
         });
         x += (t + 0.0012) / leaning.to_radians().cos();
         if stream.between(0.0, 1.0) < 0.3 {
@@ -130,19 +123,12 @@ pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
     };
     let wall = 0.014;
     let mut profile = vec![(0.0, 0.0), (radii[0] * height - 0.002, 0.0)];
-    profile.extend(
-        (0..=STEPS)
-            .map(|k| k as f32 / STEPS as f32)
-            .map(|t| (radius(t) * height, 0.003 + t * height)),
-    );
+    let share = |k: u32| k as f32 / STEPS as f32;
+    profile.extend((0..=STEPS).map(share).map(|t| (radius(t) * height, 0.003 + t * height)));
     let top = radius(1.0) * height;
     profile.push((top - 0.3 * wall * height, 0.003 + height * 1.004));
-    profile.extend(
-        (3..=STEPS)
-            .rev()
-            .map(|k| k as f32 / STEPS as f32)
-            .map(|t| ((radius(t) - wall) * height, t * height)),
-    );
+    let inside = (3..=STEPS).rev().map(share);
+    profile.extend(inside.map(|t| ((radius(t) - wall) * height, t * height)));
     profile.push((0.0, 0.06 * height));
     b.lathe(mat, 48, &profile);
 }

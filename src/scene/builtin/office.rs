@@ -139,18 +139,9 @@ fn wall_things(b: &mut Builder, m: &Palette) {
         for (y, seed) in [(1.52, 5), (1.92, 9)] {
             b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
             for u in [3.35, 5.05] {
-                b.slab(
-                    m.steel,
-                    [u - 0.012, y - 0.16, -0.008],
-                    [u + 0.012, y + 0.002, 0.008],
-                    0.002,
-                );
-                b.slab(
-                    m.steel,
-                    [u - 0.012, y - 0.012, -0.002],
-                    [u + 0.012, y + 0.003, 0.20],
-                    0.002,
-                );
+                let (left, right) = (u - 0.012, u + 0.012);
+                b.slab(m.steel, [left, y - 0.16, -0.008], [right, y + 0.002, 0.008], 0.002);
+                b.slab(m.steel, [left, y - 0.012, -0.002], [right, y + 0.003, 0.20], 0.002);
             }
             b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
                 objects::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);

@@ -25,7 +25,7 @@ pub(super) fn build() -> Scene {
     let ceramic = b.material(materials::ceramic());
 
     b.quad(ground, Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0);
-    plinth(b, stone, [0.0, 0.0, 0.0], 0.0, [0.9, 0.32, 0.9]);
+    b.standing(Vec3::ZERO, 0.0, |b| plinth(b, stone, 0.45, 0.32));
     b.standing(Vec3::Y * 0.32, 0.0, |b| knot(b, bronze));
     b.ball(red, Vec3::new(-1.9, 0.70, -0.7), 0.70);
     b.ball(steel, Vec3::new(-1.05, 0.26, 0.75), 0.26);
@@ -51,13 +51,11 @@ pub(super) fn build() -> Scene {
     b.finish()
 }
 
-/// A block in two steps.
-fn plinth(b: &mut Builder, mat: Mat, at: [f32; 3], yaw: f32, [w, h, d]: [f32; 3]) {
-    b.standing(Vec3::from(at), yaw, |b| {
-        let (x, z) = (0.5 * w, 0.5 * d);
-        b.slab(mat, [-x - 0.12, 0.0, -z - 0.12], [x + 0.12, 0.4 * h, z + 0.12], 0.012);
-        b.slab(mat, [-x, 0.3 * h, -z], [x, h, z], 0.012);
-    });
+/// A square block in two steps.
+fn plinth(b: &mut Builder, mat: Mat, half: f32, height: f32) {
+    let foot = half + 0.12;
+    b.slab(mat, [-foot, 0.0, -foot], [foot, 0.4 * height, foot], 0.012);
+    b.slab(mat, [-half, 0.3 * height, -half], [half, height, half], 0.012);
 }
 
 /// A trefoil knot on its edge.

@@ -202,6 +202,7 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
     ];
     b.tube(bark, 16, &path);
     let limbs = 7;
+    let leaf_length = 0.035 * height.sqrt() + 0.06;
     for i in 0..limbs {
         let (s, c) = (i as f32 * 2.4 + stream.between(-0.3, 0.3)).sin_cos();
         let reach = height * stream.between(0.16, 0.26) * if i == 0 { 0.2 } else { 1.0 };
@@ -213,14 +214,7 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
         b.tube(bark, 8, &path);
         let size = height * stream.between(0.13, 0.19);
         let half = Vec3::new(size, 0.8 * size, size);
-        foliage(
-            b,
-            mat,
-            tip + Vec3::Y * 0.05 * height,
-            half,
-            leaves / limbs,
-            0.035 * height.sqrt() + 0.06,
-            seed * 13 + i,
-        );
+        let centre = tip + Vec3::Y * 0.05 * height;
+        foliage(b, mat, centre, half, leaves / limbs, leaf_length, seed * 13 + i);
     }
 }

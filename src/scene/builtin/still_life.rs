@@ -58,12 +58,8 @@ fn room(b: &mut Builder) {
     b.standing(Vec3::ZERO, 0.0, |b| {
         furniture::drawers(b, oak, brass, [BOARD[0], BOARD[1] - 0.012, BOARD[2]], [4, 3]);
     });
-    b.slab(
-        oak,
-        [-0.5 * BOARD[0] - 0.012, BOARD[1] - 0.024, -0.5 * BOARD[2] - 0.01],
-        [0.5 * BOARD[0] + 0.012, BOARD[1], 0.5 * BOARD[2] + 0.012],
-        0.004,
-    );
+    let (x, top, z) = (0.5 * BOARD[0], BOARD[1], 0.5 * BOARD[2]);
+    b.slab(oak, [-x - 0.012, top - 0.024, -z - 0.01], [x + 0.012, top, z + 0.012], 0.004);
     let silver = b.material(metal("silvered glass", [0.93, 0.93, 0.91], 0.0));
     b.part(placed([-0.20, 1.22, -0.30], [90.0, 0.0, 0.0]), |b| {
         let r = 0.235;

@@ -183,15 +183,8 @@ fn cafe(b: &mut Builder, m: &Palette) {
             }
             b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
                 b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);
-                plants::foliage(
-                    b,
-                    m.leaf,
-                    Vec3::Y * 0.10,
-                    Vec3::new(0.05, 0.06, 0.05),
-                    24,
-                    0.05,
-                    k as u32,
-                );
+                let half = Vec3::new(0.05, 0.06, 0.05);
+                plants::foliage(b, m.leaf, Vec3::Y * 0.10, half, 24, 0.05, k as u32);
             });
             for turn in [0.0, 130.0, 235.0].into_iter().take(2 + k % 2) {
                 let (s, c) = f32::to_radians(turn + 7.0 * k as f32).sin_cos();
@@ -217,15 +210,8 @@ fn greenery(b: &mut Builder, m: &Palette) {
     {
         b.standing(Vec3::new(x, 0.09, z), 20.0 * k as f32, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.27, 0.46);
-            plants::foliage(
-                b,
-                m.leaf,
-                Vec3::Y * (soil + 0.26),
-                Vec3::new(0.30, 0.32, 0.30),
-                300,
-                0.10,
-                k as u32 + 3,
-            );
+            let (centre, half) = (Vec3::Y * (soil + 0.26), Vec3::new(0.30, 0.32, 0.30));
+            plants::foliage(b, m.leaf, centre, half, 300, 0.10, k as u32 + 3);
         });
     }
 }
