@@ -32,33 +32,22 @@ impl fmt::Display for TableKind {
     }
 }
 
-/// Options of an [`super::Environment`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EnvironmentOptions {
-    /// Importance table.
-    pub table: TableKind,
-    /// Tiles along u, at least 1; no more are made than the map has columns.
-    pub tile_columns: u32,
-    /// Tiles along v, at least 1; no more are made than the map has rows.
-    pub tile_rows: u32,
-    /// Rotation about +Y in radians; it increases the lat-long `u` at which each texel is seen.
-    pub rotation_radians: f32,
-    /// Factor on all radiance, at least 0.
-    pub intensity: f32,
-    /// Factor on the light of the sun alone, at least 0; the map is changed accordingly.
-    pub sun: f32,
-}
-
-impl Default for EnvironmentOptions {
-    fn default() -> Self {
-        Self {
-            table: TableKind::default(),
-            tile_columns: 16,
-            tile_rows: 8,
-            rotation_radians: 0.0,
-            intensity: 1.0,
-            sun: 1.0,
-        }
+with_defaults! {
+    /// Options of an [`super::Environment`].
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    pub struct EnvironmentOptions {
+        /// Importance table.
+        pub table: TableKind = TableKind::default(),
+        /// Tiles along u, at least 1; no more are made than the map has columns.
+        pub tile_columns: u32 = 16,
+        /// Tiles along v, at least 1; no more are made than the map has rows.
+        pub tile_rows: u32 = 8,
+        /// Rotation about +Y in radians; it increases the lat-long `u` at which each texel is seen.
+        pub rotation_radians: f32 = 0.0,
+        /// Factor on all radiance, at least 0.
+        pub intensity: f32 = 1.0,
+        /// Factor on the light of the sun alone, at least 0; the map is changed accordingly.
+        pub sun: f32 = 1.0,
     }
 }
 
