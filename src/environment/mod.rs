@@ -47,6 +47,7 @@ pub struct Environment {
     map: Arc<Image>,
     grid: TileGrid,
     table: Arc<Table>,
+    table_kind: TableKind,
     tile_energies: Vec<f64>,
     pub(crate) patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
@@ -138,6 +139,7 @@ impl Environment {
             map: Arc::new(map),
             grid,
             table: Arc::new(table),
+            table_kind: options.table,
             tile_energies,
             importance_scale,
             importances: Arc::new(importances),
@@ -328,7 +330,7 @@ impl Environment {
 
     /// Which table.
     pub(crate) fn table_kind(&self) -> TableKind {
-        self.table.kind()
+        self.table_kind
     }
 
     /// Rotation in turns, in `[0,1)`, and the factor on all radiance.

@@ -10,7 +10,6 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::TableKind;
 use super::patches::PatchSample;
 use super::tiles::TilePatches;
 use super::weights::Weights;
@@ -134,15 +133,6 @@ impl SummedArea {
             }
         };
         (at(x.end, y.end) - at(x.start, y.end)) - (at(x.end, y.start) - at(x.start, y.start))
-    }
-
-    /// Which table it is.
-    pub(crate) fn kind(&self) -> TableKind {
-        match self.corners {
-            Corners::U32(_) => TableKind::U32,
-            Corners::F32(_) => TableKind::F32,
-            Corners::F64(_) => TableKind::F64,
-        }
     }
 
     /// Bytes of the table.

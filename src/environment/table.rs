@@ -81,14 +81,6 @@ impl Table {
         }
     }
 
-    /// Which kind it is.
-    pub(crate) fn kind(&self) -> TableKind {
-        match self {
-            Self::TileLocal(_) => TableKind::TileLocal,
-            Self::SummedArea(table) => table.kind(),
-        }
-    }
-
     /// Sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
     pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
         match self {
