@@ -35,31 +35,17 @@ pub(crate) struct SummedArea {
 impl SummedArea {
     /// Sums in f64, row by row of corners.
     pub(crate) fn in_f64(weights: &Weights<'_>) -> Self {
-        let mut corners = zero(weights);
-        let mut rows = corners.chunks_exact_mut(stride(weights)).skip(1);
-        for_each_corner_row(weights, |sums| {
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(sums);
-            }
-        });
-        Self { stride: stride(weights), corners: Corners::F64(corners), unit: 1.0 }
+        let corners = Corners::F64(stored(weights, |sum| sum));
+        Self { stride: stride(weights), corners, unit: 1.0 }
     }
 
     /// Sums in f64, then maps `[0, total]` to the integers `[0, 2^32 - 1]`: the talk's table.
     pub(crate) fn in_u32(weights: &Weights<'_>) -> Self {
-        let total = total(weights);
-        let mut corners = zero(weights);
-        let mut rows = corners.chunks_exact_mut(stride(weights)).skip(1);
-        for_each_corner_row(weights, |sums| {
-            if let Some(row) = rows.next() {
-                for (rounded, sum) in row.iter_mut().zip(sums) {
-                    // 0 / 0 of a black map converts to 0.
-                    *rounded = (sum / total * f64::from(u32::MAX)).round() as u32;
-                }
-            }
-        });
-        let unit = total / f64::from(u32::MAX);
-        Self { stride: stride(weights), corners: Corners::U32(corners), unit }
+        let (total, largest) = (total(weights), f64::from(u32::MAX));
+        // 0 / 0 of a black map converts to 0.
+        let rounded = |sum: f64| (sum / total * largest).round() as u32;
+        let corners = Corners::U32(stored(weights, rounded));
+        Self { stride: stride(weights), corners, unit: total / largest }
     }
 
     /// Sums in f32 by the usual recurrence `w + left + above - diagonal`, of weights scaled to a
@@ -152,6 +138,18 @@ fn stride(weights: &Weights<'_>) -> usize {
 
 fn zero<T: Clone + Default>(weights: &Weights<'_>) -> Vec<T> {
     vec![T::default(); stride(weights) * (weights.size().1 as usize + 1)]
+}
+
+/// The f64 sums at all corners of patches, each as `store` makes it.
+fn stored<T: Clone + Default>(weights: &Weights<'_>, store: impl Fn(f64) -> T) -> Vec<T> {
+    let mut corners = zero(weights);
+    let mut rows = corners.chunks_exact_mut(stride(weights)).skip(1);
+    for_each_corner_row(weights, |sums| {
+        if let Some(row) = rows.next() {
+            row.iter_mut().zip(sums).for_each(|(corner, sum)| *corner = store(*sum));
+        }
+    });
+    corners
 }
 
 struct Choice {
