@@ -256,16 +256,7 @@ impl fmt::Display for SatReport {
         )?;
         writeln!(
             f,
-            "{:<10} {:>9} {:>9} {:>13} {:>9} {:>13} {:>9} {:>9} {:>9}",
-            "table",
-            "MSE",
-            "missed",
-            "missed energy",
-            "falling",
-            "misreported",
-            "build s",
-            "ns/sample",
-            "MiB"
+            "table            MSE    missed missed energy   falling   misreported   build s ns/sample       MiB"
         )?;
         for row in &self.rows {
             writeln!(
