@@ -1,6 +1,8 @@
 //! Discs of light whose energy on the map does not depend on its resolution.
 
-use glam::Vec3;
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, Vec3};
 
 use crate::image::Image;
 use crate::math::{texel_solid_angle, uv_from_direction};
@@ -21,9 +23,8 @@ pub(super) fn add_disc(image: &mut Image, disc: &Disc) {
     let (w, h) = (f64::from(image.width), f64::from(image.height));
     let centre = uv_from_direction(disc.direction);
     let (u0, v0) = (f64::from(centre.x), f64::from(centre.y));
-    let r = disc.radius_radians / std::f64::consts::PI;
-    let sin_least =
-        (std::f64::consts::PI * v0).sin().min((std::f64::consts::PI * (v0 + r)).sin()).max(0.02);
+    let r = disc.radius_radians / PI;
+    let sin_least = (PI * v0).sin().min((PI * (v0 + r)).sin()).max(0.02);
     let rows = ((v0 - r) * h).floor().max(0.0) as u32..=((v0 + r) * h).floor().min(h - 1.0) as u32;
     let half_width = (0.5 * r / sin_least * w).ceil() as i64 + 1;
     let middle = (u0 * w) as i64;
@@ -41,17 +42,11 @@ pub(super) fn add_disc(image: &mut Image, disc: &Disc) {
         for x in columns.clone() {
             let mut inside = 0.0;
             for j in 0..ss_y {
-                let theta = std::f64::consts::PI
-                    * (f64::from(y) + (f64::from(j) + 0.5) / f64::from(ss_y))
-                    / h;
+                let theta = PI * (f64::from(y) + (f64::from(j) + 0.5) / f64::from(ss_y)) / h;
                 for i in 0..ss_x {
-                    let phi = std::f64::consts::TAU
-                        * ((x as f64 + (f64::from(i) + 0.5) / f64::from(ss_x)) / w - 0.5);
-                    let d = glam::DVec3::new(
-                        theta.sin() * phi.cos(),
-                        theta.cos(),
-                        theta.sin() * phi.sin(),
-                    );
+                    let phi = TAU * ((x as f64 + (f64::from(i) + 0.5) / f64::from(ss_x)) / w - 0.5);
+                    let d =
+                        DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
                     if d.dot(axis) > cos_radius {
                         inside += 1.0;
                     }
@@ -65,7 +60,7 @@ pub(super) fn add_disc(image: &mut Image, disc: &Disc) {
             }
         }
     }
-    let solid_angle = std::f64::consts::TAU * (1.0 - cos_radius);
+    let solid_angle = TAU * (1.0 - cos_radius);
     if covered.is_empty() {
         let y = ((v0 * h) as u32).min(image.height - 1);
         covered.push((middle.rem_euclid(i64::from(image.width)) as u32, y, 1.0));
