@@ -46,8 +46,9 @@ pub fn build(name: &str, width: u32, height: u32) -> Result<Image> {
         )));
     }
     let (smooth, discs): (fn(Vec3) -> Vec3, Vec<Disc>) = match name {
-        "day" => (day, vec![day_sun()]),
-        "sunset" => (sunset, vec![sunset_sun()]),
+        // The sun is about 1.3e5 times as bright as the sky; normal irradiance 3.1.
+        "day" => (day, vec![sun([22.0, 38.0], 0.267, Vec3::new(4.6e4, 4.4e4, 4.0e4))]),
+        "sunset" => (sunset, vec![sun([12.0, 6.0], 0.8, Vec3::new(1500.0, 700.0, 220.0))]),
         "night" => (night, lamps()),
         "overcast" => (overcast, Vec::new()),
         "hallway" => (hallway, Vec::new()),
@@ -66,21 +67,9 @@ fn direction(azimuth_degrees: f32, elevation_degrees: f32) -> Vec3 {
     Vec3::new(e.cos() * a.cos(), e.sin(), e.cos() * a.sin())
 }
 
-/// About 1.3e5 times the sky; normal irradiance 3.1.
-fn day_sun() -> Disc {
-    Disc {
-        direction: direction(22.0, 38.0),
-        radius_radians: 0.267_f64.to_radians(),
-        radiance: Vec3::new(4.6e4, 4.4e4, 4.0e4),
-    }
-}
-
-fn sunset_sun() -> Disc {
-    Disc {
-        direction: direction(12.0, 6.0),
-        radius_radians: 0.8_f64.to_radians(),
-        radiance: Vec3::new(1500.0, 700.0, 220.0),
-    }
+/// A sun at an azimuth and an elevation, with a radius, all in degrees.
+fn sun([azimuth, elevation]: [f32; 2], radius: f64, radiance: Vec3) -> Disc {
+    Disc { direction: direction(azimuth, elevation), radius_radians: radius.to_radians(), radiance }
 }
 
 /// Forty lamps low over the horizon.
