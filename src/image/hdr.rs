@@ -40,13 +40,9 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
     }
     // Whoever writes runs needs less than four bytes a pixel. If there are as many, pixels that look like
     // runs of the old kind are dark pixels.
-    let encoding = match cursor.rest {
-        rest if starts_with_runs(rest, line.len()) => Encoding::Runs,
-        rest if rest.len() >= 4 * total => Encoding::Flat,
-        _ => Encoding::Runs,
-    };
+    let may_have_runs = starts_with_runs(cursor.rest, line.len()) || cursor.rest.len() < 4 * total;
     for row in 0..major.count {
-        read_line(&mut cursor, &mut line, encoding)
+        read_line(&mut cursor, &mut line, may_have_runs)
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
@@ -254,24 +250,16 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// How the pixels of a file are written.
-#[derive(Clone, Copy, PartialEq)]
-enum Encoding {
-    /// Each by itself.
-    Flat,
-    /// In runs of the new kind or, line by line, of the old one or without runs.
-    Runs,
-}
-
 /// Whether a line of `width` pixels begins here that is written in runs of the new kind.
 fn starts_with_runs(rest: &[u8], width: usize) -> bool {
     matches!(*rest, [2, 2, high, low, ..]
         if (8..0x8000).contains(&width) && usize::from(high) << 8 | usize::from(low) == width)
 }
 
-/// Reads one line of pixels.
-fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], encoding: Encoding) -> Decoded<()> {
-    if encoding == Encoding::Flat {
+/// Reads one line of pixels: each by itself or, if there may be runs, in runs of the new kind, of the old one or
+/// without any.
+fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], may_have_runs: bool) -> Decoded<()> {
+    if !may_have_runs {
         line.copy_from_slice(cursor.take(4 * line.len())?.as_chunks().0);
         Ok(())
     } else if starts_with_runs(cursor.rest, line.len()) {
