@@ -43,26 +43,18 @@ impl Texels {
 
     /// Without an alpha that is 1 everywhere.
     pub(crate) fn without_opaque_alpha(mut self) -> Self {
-        match self.channels {
-            2 => self.drop_opaque_alpha::<2>(),
-            4 => self.drop_opaque_alpha::<4>(),
-            _ => {}
+        let (count, channels, colors) = (self.stored_len(), self.channels, self.channels - 1);
+        let is_opaque = |texel: &[u8]| texel[colors] == 255;
+        if !matches!(channels, 2 | 4) || !self.bytes.chunks_exact(channels).all(is_opaque) {
+            return self;
         }
-        self
-    }
-
-    fn drop_opaque_alpha<const CHANNELS: usize>(&mut self) {
-        let is_opaque = |texel: &[u8; CHANNELS]| texel[CHANNELS - 1] == 255;
-        if !self.chunks::<CHANNELS>().iter().all(is_opaque) {
-            return;
-        }
-        let (count, colors) = (self.stored_len(), CHANNELS - 1);
         for i in 1..count {
-            self.bytes.copy_within(i * CHANNELS..i * CHANNELS + colors, i * colors);
+            self.bytes.copy_within(i * channels..i * channels + colors, i * colors);
         }
         self.bytes.truncate(count * colors);
         self.bytes.shrink_to_fit();
         self.channels = colors;
+        self
     }
 
     /// Grey made of what an opacity in `[0,1]` becomes, in as many bits; `None` if there is no alpha.
