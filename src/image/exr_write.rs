@@ -61,15 +61,10 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
                 "" => channel,
                 layer => format!("{layer}.{channel}"),
             };
-            if values.len() != image.pixels.len() {
-                return Err(Error::at(
-                    path,
-                    format!(
-                        "cannot be written: the channel {name} has {} values for {} pixels",
-                        values.len(),
-                        image.pixels.len()
-                    ),
-                ));
+            let (found, wanted) = (values.len(), image.pixels.len());
+            if found != wanted {
+                let cause = format!("the channel {name} has {found} values for {wanted} pixels");
+                return Err(Error::at(path, format!("cannot be written: {cause}")));
             }
             channels.push(AnyChannel::new(text(&name), FlatSamples::F32(values)));
         }
