@@ -133,13 +133,8 @@ impl Axis {
         };
         match u32::try_from(index) {
             Err(_) => before,
-            Ok(index) => {
-                if index > last {
-                    after
-                } else {
-                    index
-                }
-            }
+            Ok(index) if index > last => after,
+            Ok(index) => index,
         }
     }
 }
