@@ -51,7 +51,7 @@ pub(super) fn skinned(scene: &mut Scene, part: &Part, joints: &[DAffine3]) -> Fa
 const TRIANGLE_BYTES: u64 = 250;
 const VERTEX_BYTES: u64 = 72;
 /// How a refusal of them begins.
-const WITH_INSTANCES: &str = "with all instances there are";
+pub(super) const WITH_INSTANCES: &str = "with all instances there are";
 
 fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     let total = |present: usize, added: usize| {

@@ -14,7 +14,7 @@ use json::validation::Checked;
 
 use super::bake;
 use super::document::Document;
-use super::limits::Fallible;
+use super::limits::{Fallible, check_count};
 use super::part::Part;
 use super::placement::Placement;
 use super::primitive::Mesh;
@@ -105,12 +105,8 @@ impl Sharing {
         }
         let of_mesh = |one: &Instance| meshes[one.mesh as usize].len() as u64;
         let shown: u64 = self.instances.iter().map(of_mesh).sum();
-        if shown + scene.triangles.len() as u64 > MAX_SHOWN {
-            let millions = MAX_SHOWN / 1_000_000;
-            return Err(format!(
-                "with all instances there are more than {millions} million triangles"
-            ));
-        }
+        let all = shown + scene.triangles.len() as u64;
+        check_count(all, MAX_SHOWN, bake::WITH_INSTANCES, "triangles")?;
         scene.instances = Instances::new(meshes, self.instances);
         Ok(())
     }
