@@ -30,17 +30,15 @@ pub(super) fn scale(
             ));
             1.0 / Lamps::LUMENS_PER_WATT
         }
-        Lamps::Auto => {
-            if are_physical {
-                notices.add(format!(
-                    "its lamps ({}) are far brighter than maps usually are; --lamps watts makes them 683 times \
-                     weaker, --lamps FACTOR as much as you like",
-                    brightest(lights)
-                ));
-            }
+        Lamps::Auto if are_physical => {
+            notices.add(format!(
+                "its lamps ({}) are far brighter than maps usually are; --lamps watts makes them 683 times \
+                 weaker, --lamps FACTOR as much as you like",
+                brightest(lights)
+            ));
             1.0
         }
-        Lamps::Physical => 1.0,
+        Lamps::Auto | Lamps::Physical => 1.0,
         Lamps::Watts => 1.0 / Lamps::LUMENS_PER_WATT,
         Lamps::Factor(factor) => factor,
     };
