@@ -183,12 +183,9 @@ fn header(start: &[u8]) -> Decoded<(&[u8], Header)> {
     let length = start.iter().position(|byte| *byte == b'\n').ok_or(cut)?;
     let line = &start[..length];
     let header: serde_json::Value = serde_json::from_slice(line).map_err(|_| damaged)?;
-    match header.get("lightgrid_film").and_then(serde_json::Value::as_u64) {
-        None => return Err(other.into()),
-        Some(format) if format != u64::from(FORMAT) => {
-            return Err(format!("was written by another version of lightgrid (format {format})"));
-        }
-        Some(_) => {}
+    let format = header.get("lightgrid_film").and_then(serde_json::Value::as_u64).ok_or(other)?;
+    if format != u64::from(FORMAT) {
+        return Err(format!("was written by another version of lightgrid (format {format})"));
     }
     let header: Header = serde_json::from_value(header).map_err(|_| DAMAGED)?;
     let Part { number, count } = header.facts.part;
