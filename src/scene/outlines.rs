@@ -146,17 +146,14 @@ impl Scene {
             }
         }
         let row = Row::new(facings);
-        let is_hull = |shape: &Shape, samples: &[Facing]| {
+        let is_hull = |material: &u32| {
+            let (shape, samples) = (&shapes[*material as usize], &samples[*material as usize]);
+            let Some(shape) = shape else { return false };
             let reach = DISTANCE * (shape.high - shape.low).length();
             let covering = samples.par_iter().filter(|sample| covers(sample, &row, reach)).count();
             covering as f32 >= SHARE * samples.len() as f32
         };
-        (0..)
-            .zip(shapes.iter().zip(&samples))
-            .filter_map(|(number, (shape, samples))| {
-                shape.as_ref().filter(|shape| is_hull(shape, samples)).map(|_| number)
-            })
-            .collect()
+        (0..shapes.len() as u32).filter(is_hull).collect()
     }
 
     /// Leaves out all that is of materials of these names.
