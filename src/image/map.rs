@@ -123,15 +123,9 @@ pub fn sanitise(image: &mut Image) -> Notices {
         0.0 => (MAX_HALF, "infinite (now 65504)"),
         largest => (largest, "infinite (now the largest finite value)"),
     };
-    let found: Vec<String> = [
-        (defects.nan, "NaN (now 0)"),
-        (defects.infinite, largest_is),
-        (defects.negative, "negative (now 0)"),
-    ]
-    .iter()
-    .filter(|(count, _)| *count > 0)
-    .map(|(count, kind)| format!("{count} {kind}"))
-    .collect();
+    let kinds = ["NaN (now 0)", largest_is, "negative (now 0)"];
+    let found = defects.pixels.iter().zip(kinds).filter(|(count, _)| **count > 0);
+    let found: Vec<String> = found.map(|(count, kind)| format!("{count} {kind}")).collect();
     if !found.is_empty() {
         image.pixels.par_chunks_mut(CHUNK).for_each(|pixels| {
             for v in pixels.as_flattened_mut() {
@@ -146,9 +140,8 @@ pub fn sanitise(image: &mut Image) -> Notices {
 /// How many pixels have a channel that is no radiance, and the largest finite value of all.
 #[derive(Default, Clone, Copy)]
 struct Defects {
-    nan: usize,
-    infinite: usize,
-    negative: usize,
+    /// With a channel that is NaN, infinite, or negative.
+    pixels: [usize; 3],
     largest: f32,
 }
 
@@ -160,24 +153,17 @@ impl Defects {
         if sound {
             return Self { largest: values.iter().copied().fold(0.0, f32::max), ..Self::default() };
         }
+        let tests: [fn(f32) -> bool; 3] = [f32::is_nan, |v| v == f32::INFINITY, |v| v < 0.0];
         let count = |test: fn(f32) -> bool| {
             pixels.iter().filter(|rgb| rgb.iter().any(|&v| test(v))).count()
         };
-        Self {
-            nan: count(f32::is_nan),
-            infinite: count(|v| v == f32::INFINITY),
-            negative: count(|v| v < 0.0),
-            largest: values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max),
-        }
+        let largest = values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
+        Self { pixels: tests.map(count), largest }
     }
 
     fn and(self, other: Self) -> Self {
-        Self {
-            nan: self.nan + other.nan,
-            infinite: self.infinite + other.infinite,
-            negative: self.negative + other.negative,
-            largest: self.largest.max(other.largest),
-        }
+        let pixels = std::array::from_fn(|i| self.pixels[i] + other.pixels[i]);
+        Self { pixels, largest: self.largest.max(other.largest) }
     }
 }
 
