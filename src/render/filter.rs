@@ -21,23 +21,16 @@ pub enum PixelFilter {
 impl PixelFilter {
     /// Offset from the pixel's centre in pixels for a point of the unit square.
     pub fn sample(self, u: Vec2) -> Vec2 {
-        match self {
-            Self::Box => u - 0.5,
-            Self::Gauss => Vec2::new(invert(&GAUSS, u.x), invert(&GAUSS, u.y)),
-            Self::BlackmanHarris => {
-                Vec2::new(invert(&BLACKMAN_HARRIS, u.x), invert(&BLACKMAN_HARRIS, u.y))
-            }
-        }
+        let inverted = |table| Vec2::new(invert(table, u.x), invert(table, u.y));
+        self.cumulative().map_or(u - 0.5, inverted)
     }
-}
 
-impl PixelFilter {
     /// Running integral over the filter's width, which [`Self::sample`] inverts; none for a box.
-    pub(super) fn cumulative(self) -> &'static [f32] {
+    pub(super) fn cumulative(self) -> Option<&'static Cumulative> {
         match self {
-            Self::Box => &[],
-            Self::Gauss => &*GAUSS,
-            Self::BlackmanHarris => &*BLACKMAN_HARRIS,
+            Self::Box => None,
+            Self::Gauss => Some(&GAUSS),
+            Self::BlackmanHarris => Some(&BLACKMAN_HARRIS),
         }
     }
 }

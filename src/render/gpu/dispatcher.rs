@@ -101,7 +101,8 @@ impl Dispatcher {
             texels.extend(rescatter::texels());
         }
         constants.filter_at = texels.len() as u32;
-        texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
+        let sums = view.filter.cumulative().into_iter().flatten();
+        texels.extend(sums.map(|&sum| [sum, 0.0, 0.0, 0.0]));
         constants.rows_at = texels.len() as u32;
         texels.extend(layout::map_rows(environment));
         put_array(buffers, "tables", "the list of constants", &texels)
