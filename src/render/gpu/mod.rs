@@ -87,17 +87,12 @@ enum Rendering {
 impl Rendering {
     /// Makes the buffers it needs.
     fn new(on: &mut Dispatcher) -> Result<Self> {
-        let tiles = on.tiles().count();
-        let Dispatcher { gpu, buffers, globals, features, constants, .. } = on;
-        if let Some(tile) = constants.shared_tile {
-            let size = [globals.width, globals.height];
-            return Sharing::new(buffers, *features, tile, size).map(Self::Sharing);
+        if let Some(tile) = on.constants.shared_tile {
+            return Sharing::new(on, tile).map(Self::Sharing);
         }
-        let is_cached = features.view.contains(ViewFeatures::RADIANCE_CACHE);
-        match Schedule::of(gpu) {
-            Schedule::Queue if !is_cached => {
-                Queue::new(buffers, gpu, *features, tiles).map(Self::Queue)
-            }
+        let is_cached = on.features.view.contains(ViewFeatures::RADIANCE_CACHE);
+        match Schedule::of(&on.gpu) {
+            Schedule::Queue if !is_cached => Queue::new(on).map(Self::Queue),
             _ => Ok(Self::Whole),
         }
     }

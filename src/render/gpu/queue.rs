@@ -5,7 +5,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Pass;
-use super::buffers::Buffers;
 use super::device::Gpu;
 use super::dispatcher::Dispatcher;
 use super::features::Features;
@@ -44,18 +43,14 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// Makes the buffers for a picture of so many tiles.
-    pub(super) fn new(
-        buffers: &mut Buffers,
-        gpu: &Gpu,
-        features: Features,
-        tiles: u64,
-    ) -> Result<Self> {
-        let is_integrated = gpu.facts().is_integrated();
-        let groups = tiles.min(if is_integrated { MAX_GROUPS_INTEGRATED } else { MAX_GROUPS });
-        let slot_bytes = 16 * u64::from(SlotTexels::of(features).count);
-        buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
-        buffers.make("queue", REPORT_BYTES, "a count")?;
+    /// Makes the buffers for the picture.
+    pub(super) fn new(on: &mut Dispatcher) -> Result<Self> {
+        let is_integrated = on.gpu.facts().is_integrated();
+        let most_groups = if is_integrated { MAX_GROUPS_INTEGRATED } else { MAX_GROUPS };
+        let groups = on.tiles().count().min(most_groups);
+        let slot_bytes = 16 * u64::from(SlotTexels::of(on.features).count);
+        on.buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
+        on.buffers.make("queue", REPORT_BYTES, "a count")?;
         Ok(Self { groups, is_filled: false, samples: 0 })
     }
 

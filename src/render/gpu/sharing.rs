@@ -4,9 +4,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Pass;
-use super::buffers::Buffers;
 use super::dispatcher::Dispatcher;
-use super::features::{Features, ViewFeatures};
+use super::features::ViewFeatures;
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
 use super::progress::{GROUP, Progress};
@@ -31,15 +30,12 @@ pub(super) struct Sharing {
 }
 
 impl Sharing {
-    /// Makes the buffers for a picture of this size.
-    pub(super) fn new(
-        buffers: &mut Buffers,
-        features: Features,
-        tile: SharedTile,
-        size: [u32; 2],
-    ) -> Result<Self> {
+    /// Makes the buffers for the picture.
+    pub(super) fn new(on: &mut Dispatcher, tile: SharedTile) -> Result<Self> {
+        let Dispatcher { buffers, globals, features, .. } = on;
         // Tiles stick out of the picture on all sides.
-        let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
+        let tiles =
+            [globals.width, globals.height].map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
         let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MAX_GROUPS);
         let has_layers = features.view.contains(ViewFeatures::LAYERS);
         let is_behind = features.scene.contains(SceneFeatures::PERFECT_INTERFACES);
