@@ -1,4 +1,4 @@
-//! What the device learns: where light comes from, and what surfaces reflect of it.
+//! Paths that the device learns from, and the counters of what they see.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,44 +9,10 @@ use super::layout::Work;
 use super::progress::{GROUP, MAX_GROUPS};
 use crate::error::Result;
 use crate::light_grid::LearningGrid;
-use crate::radiance_cache::RadianceSums;
-
-/// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
-/// rays, or `None` if it is cancelled: the counters are then, or if it fails, as before.
-pub(super) fn learn(
-    on: &mut Dispatcher,
-    paths: Range<u64>,
-    learning: &LearningGrid,
-    cancel: &AtomicBool,
-) -> Result<Option<u64>> {
-    put_counters(on, learning)?;
-    let (done, rays) = trace_anywhere(on, Kernel::Learn, paths.clone(), cancel)?;
-    if done < paths.end {
-        return Ok(None);
-    }
-    take_counters(on, learning)?;
-    Ok(Some(rays))
-}
-
-/// Traces paths that train the radiance cache; what was set of it last is what is known by now.
-/// Returns the first path that was not traced, and the number of rays.
-pub(super) fn train(
-    on: &mut Dispatcher,
-    paths: Range<u64>,
-    sums: &RadianceSums,
-    cancel: &AtomicBool,
-) -> Result<(u64, u64)> {
-    let (words, scale) = sums.words_and_scale();
-    on.globals.set_cells_of_cache(&sums.cells, scale);
-    on.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
-    let done = trace_anywhere(on, Kernel::Train, paths, cancel)?;
-    sums.set_words(&on.read_words("cache_sums", words.len())?);
-    Ok(done)
-}
 
 /// Traces paths that begin anywhere in the picture, as far as `cancel` allows. Returns the first one
 /// that was not traced, and the number of rays of the others.
-fn trace_anywhere(
+pub(super) fn trace_anywhere(
     on: &mut Dispatcher,
     kernel: Kernel,
     paths: Range<u64>,

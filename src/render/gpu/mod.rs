@@ -251,7 +251,14 @@ impl Renderer {
         learning: &LearningGrid,
         cancel: &AtomicBool,
     ) -> Result<Option<u64>> {
-        learning::learn(&mut self.dispatcher, paths, learning, cancel)
+        let on = &mut self.dispatcher;
+        learning::put_counters(on, learning)?;
+        let (done, rays) = learning::trace_anywhere(on, Kernel::Learn, paths.clone(), cancel)?;
+        if done < paths.end {
+            return Ok(None);
+        }
+        learning::take_counters(on, learning)?;
+        Ok(Some(rays))
     }
 
     /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
@@ -262,7 +269,13 @@ impl Renderer {
         sums: &RadianceSums,
         cancel: &AtomicBool,
     ) -> Result<(u64, u64)> {
-        learning::train(&mut self.dispatcher, paths, sums, cancel)
+        let on = &mut self.dispatcher;
+        let (words, scale) = sums.words_and_scale();
+        on.globals.set_cells_of_cache(&sums.cells, scale);
+        on.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
+        let done = learning::trace_anywhere(on, Kernel::Train, paths, cancel)?;
+        sums.set_words(&on.read_words("cache_sums", words.len())?);
+        Ok(done)
     }
 
     /// Sets going what brings every pixel of the film to a pass's target, counting in `counts` what its
