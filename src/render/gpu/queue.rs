@@ -71,7 +71,15 @@ impl Queue {
             stride: pass.stride,
             ..Work::default()
         };
-        self.fill(on)?;
+        if !self.is_filled {
+            // Slots take pixels from the first one on.
+            self.is_filled = true;
+            self.samples = 0;
+            let slots = (self.groups * GROUP) as u32;
+            on.buffers.clear("slots");
+            on.buffers.write("queue", 0, bytemuck::cast_slice(&[0, slots, 0, 0]));
+            on.gpu.check()?;
+        }
         while self.take_report(on, progress) != Some(0) {
             if cancel.load(Ordering::Relaxed) {
                 return Ok(());
@@ -83,19 +91,6 @@ impl Queue {
         self.forget_paths(on, progress)?;
         *progress = Progress::even(pass.target);
         Ok(())
-    }
-
-    /// Lets slots take pixels from the first one on, unless they go on where they were.
-    fn fill(&mut self, on: &Dispatcher) -> Result<()> {
-        if self.is_filled {
-            return Ok(());
-        }
-        self.is_filled = true;
-        self.samples = 0;
-        let slots = (self.groups * GROUP) as u32;
-        on.buffers.clear("slots");
-        on.buffers.write("queue", 0, bytemuck::cast_slice(&[0, slots, 0, 0]));
-        on.gpu.check()
     }
 
     /// Takes note of the samples that the device has told of; returns how many slots still held a path.
