@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 /// Everything the kernels bind, by the name of its variable. Clones share what was made before.
 #[derive(Clone)]
 pub(super) struct Buffers {
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
     /// Whether arrays lie in buffers, where they fit into one.
     prefers_buffers: bool,
@@ -83,8 +83,17 @@ impl Buffers {
     /// Makes an empty buffer, or an empty one in place of the one of this name. `what` is said if it
     /// does not fit.
     pub(super) fn make(&mut self, name: &'static str, bytes: u64, what: &str) -> Result<()> {
-        self.fits(bytes, what)?;
-        let buffer = self.gpu.make(|device| create(device, name, bytes));
+        if bytes > self.most_bytes() {
+            return Err(Error::new(format!(
+                "{what} takes {} MiB; {} allows {} MiB in one buffer",
+                bytes.div_ceil(1 << 20),
+                self.gpu.facts().name,
+                self.most_bytes() >> 20
+            )));
+        }
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let size = bytes.next_multiple_of(16).max(16);
+        let buffer = self.gpu.make(|device| buffer(device, Some(name), size, usage));
         self.by_name.insert(name, buffer.map_err(|e| for_want_of(bytes, what, &e))?);
         self.version += 1;
         Ok(())
@@ -112,7 +121,17 @@ impl Buffers {
         // A kernel may have been made for distributions in a buffer.
         if self.prefers_buffers && (bytes <= self.most_bytes() || name == "distributions") {
             self.arrays.remove(name);
-            return self.put_parts(name, what, bytes, parts);
+            // Never in place, for others may share the old one.
+            self.make(name, bytes, what)?;
+            let mut offset = 0;
+            for part in parts {
+                for piece in part.chunks(PIECE_BYTES) {
+                    self.write(name, offset, piece);
+                    offset += piece.len() as u64;
+                    self.gpu.finish_copies()?;
+                }
+            }
+            return Ok(());
         }
         let (width, most) = (1_u64 << self.width_log2, self.gpu.limits.max_texture_dimension_2d);
         let rows = texels.div_ceil(width).max(1);
@@ -134,26 +153,6 @@ impl Buffers {
         self.by_name.remove(name);
         self.arrays.insert(name, (texture, bytes));
         self.version += 1;
-        Ok(())
-    }
-
-    /// Makes a buffer of bytes that come in parts; never in place, for others may share the old one.
-    fn put_parts<'b>(
-        &mut self,
-        name: &'static str,
-        what: &str,
-        bytes: u64,
-        parts: impl Iterator<Item = Cow<'b, [u8]>>,
-    ) -> Result<()> {
-        self.make(name, bytes, what)?;
-        let mut offset = 0;
-        for piece in parts {
-            for piece in piece.chunks(PIECE_BYTES) {
-                self.write(name, offset, piece);
-                offset += piece.len() as u64;
-                self.finish_copies()?;
-            }
-        }
         Ok(())
     }
 
@@ -207,13 +206,8 @@ impl Buffers {
             },
             wgpu::Extent3d { width: 1 << self.width_log2, height: rows, depth_or_array_layers: 1 },
         );
-        self.finish_copies()?;
+        self.gpu.finish_copies()?;
         Ok(rows)
-    }
-
-    /// Waits for what was written, as [`Gpu::finish_copies`].
-    pub(super) fn finish_copies(&self) -> Result<()> {
-        self.gpu.finish_copies()
     }
 
     /// Fills a buffer that exists with zeros.
@@ -284,28 +278,11 @@ impl Buffers {
         let limits = &self.gpu.limits;
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) & !0xf
     }
-
-    fn fits(&self, bytes: u64, what: &str) -> Result<()> {
-        if bytes <= self.most_bytes() {
-            return Ok(());
-        }
-        Err(Error::new(format!(
-            "{what} takes {} MiB; {} allows {} MiB in one buffer",
-            bytes.div_ceil(1 << 20),
-            self.gpu.facts().name,
-            self.most_bytes() >> 20
-        )))
-    }
 }
 
 /// What is said if so many bytes could not be had.
 fn for_want_of(bytes: u64, what: &str, error: &Error) -> Error {
     Error::new(format!("{error} ({what} takes {} MiB)", bytes.div_ceil(1 << 20)))
-}
-
-fn create(device: &wgpu::Device, name: &str, bytes: u64) -> Buffer {
-    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-    buffer(device, Some(name), bytes.next_multiple_of(16).max(16), usage)
 }
 
 fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {

@@ -142,14 +142,14 @@ impl Sums {
             buffers.write(PIXELS[0], at, bytemuck::cast_slice(&high));
             buffers.write(PIXELS[1], at, bytemuck::cast_slice(&low));
             buffers.write(PIXELS[2], at, bytemuck::cast_slice(&counts));
-            buffers.finish_copies()?;
+            buffers.gpu.finish_copies()?;
         }
         for (piece, surfaces) in film.surfaces.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * SURFACE_BYTES;
             let (high, low) = split(surfaces.iter().map(Surface::sums));
             buffers.write(SURFACES[0], at, bytemuck::cast_slice(&high));
             buffers.write(SURFACES[1], at, bytemuck::cast_slice(&low));
-            buffers.finish_copies()?;
+            buffers.gpu.finish_copies()?;
         }
         Ok(())
     }
