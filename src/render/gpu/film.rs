@@ -115,7 +115,11 @@ impl Sums {
             rays += buffers.read(&parts, |read| {
                 let rays = take_pixels(pixels, &read[..3], self.factors().map(f64::recip));
                 if let (Some(surfaces), [_, _, _, high, low]) = (&mut surfaces, read) {
-                    take_surfaces(surfaces, high, low);
+                    let [high, low] =
+                        [high, low].map(|bytes| bytemuck::cast_slice::<_, [f32; 8]>(bytes));
+                    for ((surface, high), low) in surfaces.iter_mut().zip(high).zip(low) {
+                        *surface = Surface::of_sums(joined(*high, *low));
+                    }
                 }
                 rays
             })?;
@@ -185,14 +189,6 @@ fn take_pixels(pixels: &mut [Pixel], read: &[&[u8]], factors: [f64; 4]) -> u64 {
             u64::from(*rays)
         })
         .sum()
-}
-
-fn take_surfaces(surfaces: &mut [Surface], high: &[u8], low: &[u8]) {
-    let high: &[[f32; 8]] = bytemuck::cast_slice(high);
-    let low: &[[f32; 8]] = bytemuck::cast_slice(low);
-    for ((surface, high), low) in surfaces.iter_mut().zip(high).zip(low) {
-        *surface = Surface::of_sums(joined(*high, *low));
-    }
 }
 
 #[cfg(test)]
