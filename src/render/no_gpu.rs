@@ -22,7 +22,7 @@ pub use super::gpu_facts::{
 /// What is said where a GPU is asked for.
 pub(crate) const NO_GPU: &str = "this lightgrid was built without GPU rendering (feature `gpu`)";
 
-/// Methods of what there cannot be one of. They get `self` from the caller: a macro's own is another.
+/// Functions that are given what there cannot be one of, which is named first: a macro's own `self` is another.
 macro_rules! never {
     ($this:ident; impl $type:ty {
         $($(#[$attribute:meta])* $visibility:vis fn $name:ident $arguments:tt $(-> $result:ty)?;)+
@@ -84,23 +84,21 @@ never! { self; impl Gpu {
 /// A scene and a map on a device.
 pub enum UploadedScene {}
 
-impl UploadedScene {
+never! { gpu; impl UploadedScene {
     /// Uploads both.
     ///
     /// # Errors
     /// None.
-    pub fn new(gpu: &Gpu, _: &World, _: &Environment) -> Result<Self> {
-        match *gpu {}
-    }
+    pub fn new(gpu: &Gpu, _: &World, _: &Environment) -> Result<Self>;
+} }
 
+never! { self; impl UploadedScene {
     /// The same scene under another map.
     ///
     /// # Errors
     /// None.
-    pub fn relit(&self, _: &Environment) -> Result<Self> {
-        match *self {}
-    }
-}
+    pub fn relit(&self, _: &Environment) -> Result<Self>;
+} }
 
 impl KernelFacts {
     /// Of the kernel for a scene: none.
@@ -115,20 +113,16 @@ pub(crate) enum DeviceFilm {}
 /// What a device holds of a picture in the making.
 pub(crate) enum Renderer {}
 
-impl Renderer {
-    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View, _: bool) -> Result<Self> {
-        match *uploaded {}
-    }
-}
+never! { uploaded; impl Renderer {
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View, _: bool) -> Result<Self>;
+} }
 
 /// Traces rays alone on a device.
 pub(crate) enum Caster {}
 
-impl Caster {
-    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View) -> Result<Self> {
-        match *uploaded {}
-    }
-}
+never! { uploaded; impl Caster {
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View) -> Result<Self>;
+} }
 
 never! { self; impl Caster {
     pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()>;
