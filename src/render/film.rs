@@ -14,8 +14,8 @@ const MIN_LIT: usize = 1000;
 /// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pixel {
-    sum: [f64; 3],
-    luminance_squared: f64,
+    /// Red, green, blue and squared luminance.
+    sums: [f64; 4],
     samples: u32,
     invalid: u32,
 }
@@ -57,33 +57,27 @@ impl Pixel {
     /// Adds one sample.
     pub fn add(&mut self, result: &PathResult) {
         let radiance = result.radiance;
-        self.sum.iter_mut().zip(radiance.to_array()).for_each(|(s, r)| *s += f64::from(r));
-        self.luminance_squared += f64::from(luminance(radiance)).powi(2);
+        self.sums.iter_mut().zip(radiance.to_array()).for_each(|(s, r)| *s += f64::from(r));
+        self.sums[3] += f64::from(luminance(radiance)).powi(2);
         self.samples += 1;
         self.invalid += u32::from(result.was_invalid);
     }
 
     /// Adds all samples of another one.
     pub(super) fn add_all(&mut self, other: &Self) {
-        self.sum.iter_mut().zip(other.sum).for_each(|(sum, more)| *sum += more);
-        self.luminance_squared += other.luminance_squared;
+        self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
         self.samples = self.samples.saturating_add(other.samples);
         self.invalid = self.invalid.saturating_add(other.invalid);
     }
 
     /// Of sums over `samples` samples: red, green, blue and squared luminance.
-    pub(crate) fn of_sums(
-        [r, g, b, luminance_squared]: [f64; 4],
-        samples: u32,
-        invalid: u32,
-    ) -> Self {
-        Self { sum: [r, g, b], luminance_squared, samples, invalid }
+    pub(crate) fn of_sums(sums: [f64; 4], samples: u32, invalid: u32) -> Self {
+        Self { sums, samples, invalid }
     }
 
     /// What [`Self::of_sums`] takes.
     pub(crate) fn sums(&self) -> [f64; 4] {
-        let [r, g, b] = self.sum;
-        [r, g, b, self.luminance_squared]
+        self.sums
     }
 
     /// Number of samples that were left out because they were not finite.
@@ -99,7 +93,7 @@ impl Pixel {
     /// Mean radiance; black before the first sample.
     pub fn mean(&self) -> [f64; 3] {
         let count = f64::from(self.samples.max(1));
-        self.sum.map(|s| s / count)
+        [0, 1, 2].map(|channel| self.sums[channel] / count)
     }
 
     /// Mean luminance.
@@ -115,7 +109,7 @@ impl Pixel {
             return f64::INFINITY;
         }
         let count = f64::from(self.samples);
-        let variance = (self.luminance_squared / count - self.mean_luminance().powi(2)).max(0.0);
+        let variance = (self.sums[3] / count - self.mean_luminance().powi(2)).max(0.0);
         variance / (count - 1.0)
     }
 }
@@ -242,7 +236,7 @@ impl Film {
         let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
         let by_more = lit().filter(|pixel| {
             let sum = pixel.mean_luminance() * f64::from(pixel.samples);
-            sum * sum > 1.5 * pixel.luminance_squared
+            sum * sum > 1.5 * pixel.sums[3]
         });
         let (lit, by_more) = (lit().count(), by_more.count());
         lit * MIN_LIT < sampled && 10 * by_more <= lit
