@@ -157,16 +157,12 @@ impl<'a> Driver<'a> {
         if self.has_learned_enough() {
             self.session.finish_learning();
         }
-        match self.next_beginning() {
-            Some(every) => {
-                self.session.begin(every, cancel);
-                Ok(())
-            }
-            None => {
-                let samples = self.next_pass();
-                self.session.advance(samples, cancel)
-            }
+        if let Some(every) = self.next_beginning() {
+            self.session.begin(every, cancel);
+            return Ok(());
         }
+        let samples = self.next_pass();
+        self.session.advance(samples, cancel)
     }
 
     /// Whether there is a picture of this session's own samples.
@@ -200,12 +196,16 @@ impl<'a> Driver<'a> {
     /// # Errors
     /// If a GPU fails.
     pub(crate) fn take_up(&mut self) -> Result<()> {
-        let Some(Awaited { film, figures, noted, .. }) = self
-            .awaited
-            .take_if(|awaited| is_ready(awaited, &self.session, &self.rule, self.skipped))
-        else {
-            return Ok(());
+        let session = &self.session;
+        let is_ready = |awaited: &mut Awaited| {
+            let samples = self.skipped + awaited.film.min_samples();
+            let is_done = self.rule.samples.is_some_and(|limit| samples >= limit);
+            (is_done && !awaited.learns_anyway)
+                || session.has_final_distributions()
+                || (session.phase() == Phase::Rendering && session.samples() >= samples)
         };
+        let Some(awaited) = self.awaited.take_if(is_ready) else { return Ok(()) };
+        let Awaited { film, figures, noted, .. } = awaited;
         self.session.continue_from(film, (&figures.unwrap_or_default(), noted), self.skipped)
     }
 
@@ -231,8 +231,7 @@ impl<'a> Driver<'a> {
         let (figures, view) = (self.session.figures(), self.session.view());
         let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds = figures.render_seconds / figures.samples as f64 * pixels;
-        let left =
-            self.rule.seconds.unwrap_or(f64::INFINITY) - self.session.figures().elapsed_seconds();
+        let left = self.rule.seconds.unwrap_or(f64::INFINITY) - figures.elapsed_seconds();
         figures.samples > 0 && RESERVE * seconds < left
     }
 
@@ -262,15 +261,6 @@ impl<'a> Driver<'a> {
         }
         self.target.min(self.rule.samples.unwrap_or(u32::MAX)).saturating_sub(samples).max(1)
     }
-}
-
-/// Whether the session has learned what belongs to the film that awaits it.
-fn is_ready(awaited: &Awaited, session: &Session<'_>, rule: &StopRule, skipped: u32) -> bool {
-    let samples = skipped + awaited.film.min_samples();
-    let is_done = rule.samples.is_some_and(|limit| samples >= limit);
-    (is_done && !awaited.learns_anyway)
-        || session.has_final_distributions()
-        || (session.phase() == Phase::Rendering && session.samples() >= samples)
 }
 
 /// How far apart the pixels are that [`Session::begin`] should give their first sample next: nearer and
