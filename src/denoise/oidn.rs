@@ -258,11 +258,7 @@ pub(super) fn denoise(
 
     let mut color = samples.image();
     let size = (color.width as usize, color.height as usize);
-    let mut output = Image {
-        width: color.width,
-        height: color.height,
-        pixels: vec![[0.0; 3]; color.pixels.len()],
-    };
+    let mut output = Image::filled(color.width, color.height, [0.0; 3]);
     let mut layers = samples.layers();
     // SAFETY: the calls follow the documentation; every image is a tight array of three floats a
     // pixel of the given size, and outlives the filter, which is dropped before the device.
@@ -272,7 +268,7 @@ pub(super) fn denoise(
             release: function(library, "oidnReleaseDevice")?,
         };
         if device.handle.is_null() {
-            return Err(failure(&get_error, null_mut()));
+            return Err(last_error(&get_error, null_mut()).1);
         }
         let threads = rayon::current_num_threads();
         set_device_int(device.handle, c"numThreads".as_ptr(), threads as c_int);
@@ -285,7 +281,7 @@ pub(super) fn denoise(
                 release: function(library, "oidnReleaseFilter")?,
             };
             if filter.handle.is_null() {
-                return Err(failure(&get_error, device.handle));
+                return Err(last_error(&get_error, device.handle).1);
             }
             for (name, at) in images {
                 let (name, format) = (name.as_ptr(), FORMAT_FLOAT3);
@@ -315,11 +311,10 @@ pub(super) fn denoise(
         }
         images.push((c"output", output.pixels.as_mut_ptr().cast()));
         run(&images, &flags)?;
-        let mut message = null();
-        match get_error(device.handle, &raw mut message) {
-            0 => Ok(Some(output)),
-            ERROR_CANCELLED => Ok(None),
-            _ => Err(sentence(message)),
+        match last_error(&get_error, device.handle) {
+            (0, _) => Ok(Some(output)),
+            (ERROR_CANCELLED, _) => Ok(None),
+            (_, error) => Err(error),
         }
     }
 }
@@ -333,21 +328,18 @@ unsafe extern "C" fn goes_on(cancel: *mut c_void, _progress: f64) -> bool {
     unsafe { !(*cancel.cast::<AtomicBool>()).load(Ordering::Relaxed) }
 }
 
-fn failure(get_error: &Symbol<'static, GetError>, device: Handle) -> Error {
+/// Code and sentence of the last error; code 0 is none.
+fn last_error(get_error: &Symbol<'static, GetError>, device: Handle) -> (c_int, Error) {
     let mut message = null();
     // SAFETY: a null device asks for the thread's own error.
-    unsafe { get_error(device, &raw mut message) };
-    sentence(message)
-}
-
-fn sentence(message: *const c_char) -> Error {
+    let code = unsafe { get_error(device, &raw mut message) };
     let text = if message.is_null() {
         "unknown error".into()
     } else {
         // SAFETY: the library gives a string that ends with 0 and lives until its next call.
         unsafe { CStr::from_ptr(message) }.to_string_lossy()
     };
-    Error::new(format!("Open Image Denoise: {text}"))
+    (code, Error::new(format!("Open Image Denoise: {text}")))
 }
 
 #[cfg(test)]
