@@ -135,7 +135,6 @@ impl LightGrid {
         seed: u32,
     ) -> Option<Self> {
         let mut result = Self::whole_map(energies)?;
-        let mut distribution_of_cell = vec![WHOLE_MAP as u16; grid.cell_count() as usize];
         for distribution in 1..=64_u32 {
             let weights: Vec<f64> = (0..energies.len() as u32)
                 .map(|tile| hash(seed ^ hash(distribution << 16 | tile)))
@@ -143,10 +142,9 @@ impl LightGrid {
                 .collect();
             result.distributions.push(&weights);
         }
-        for (cell, distribution) in distribution_of_cell.iter_mut().enumerate() {
-            *distribution =
-                (hash(seed.wrapping_add(cell as u32)) % result.distributions.len()) as u16;
-        }
+        let count = result.distributions.len();
+        let of_cell = |cell: u32| (hash(seed.wrapping_add(cell)) % count) as u16;
+        let distribution_of_cell = (0..grid.cell_count()).map(of_cell).collect();
         result.cells = Some(Cells { grid, distribution_of_cell });
         result.whole_map_share = 32;
         result.generation = 1;
