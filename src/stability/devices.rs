@@ -12,7 +12,7 @@ use super::scenes::{
     FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
 use crate::error::{Error, Result};
-use crate::path::{Lit, WorldBuilder};
+use crate::path::WorldBuilder;
 use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
@@ -56,17 +56,13 @@ fn luminances(film: &Film) -> impl Iterator<Item = f64> {
 fn against_f64(setting: &Setting) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
-        let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
         let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
         let reference = FloorReference::new(&environment, 0.5);
         let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
         for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
             // Directed down so that no pixel sees the floor's edge.
-            let camera = Camera::look_at(
-                camera.world_from_camera.translation.into(),
-                Vec3::new(0.0, 0.0, -0.5),
-                0.6,
-            );
+            let eye = Vec3::new(0.3, 1.0, 0.2);
+            let camera = Camera::look_at(eye, Vec3::new(0.0, 0.0, -0.5), 0.6);
             let view = View { width: side, height: side, ..view(camera, Sampling::Plain, 1) };
             let film = render(setting, (&world, &environment), view.clone(), samples)?;
             let found = Deviations::of(luminances(&film), &reference.picture(&view, samples));
@@ -87,10 +83,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
 fn against_cpu(setting: &Setting, (builder, camera): (WorldBuilder, Camera)) -> Result<Outcome> {
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
-    compare(setting, (&world, &environment), view)
-}
-
-fn compare(setting: &Setting, lit: Lit<'_>, view: View) -> Result<Outcome> {
+    let lit = (&world, &environment);
     let on_cpu = Setting { gpu: None, ..*setting };
     let samples = setting.count(16, 256);
     let cpu = render(&on_cpu, lit, view.clone(), samples)?;
