@@ -77,16 +77,11 @@ impl<'a> FloorReference<'a> {
         sum + self.albedo * self.seen(bounced) * bsdf_pdf / (bsdf_pdf + self.density(bounced))
     }
 
-    fn texels(&self, direction: DVec3) -> DVec2 {
+    fn rgb(&self, direction: DVec3) -> DVec3 {
         let map = self.environment.map();
         let u = 0.5 + direction.z.atan2(direction.x) / TAU;
         let v = direction.x.hypot(direction.z).atan2(direction.y) / PI;
-        DVec2::new(u * f64::from(map.width), v * f64::from(map.height))
-    }
-
-    fn rgb(&self, direction: DVec3) -> DVec3 {
-        let at = self.texels(direction);
-        bilinear(self.environment.map(), at.x - 0.5, at.y - 0.5)
+        bilinear(map, u * f64::from(map.width) - 0.5, v * f64::from(map.height) - 0.5)
     }
 
     fn seen(&self, direction: DVec3) -> f64 {
