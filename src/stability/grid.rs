@@ -34,7 +34,10 @@ pub(super) const CASES: &[Entry] = &[
         let center = Vec3::new(1e6, 0.0, -1e6);
         in_the_room(s, 10.0, center, room(0.7, 10.0, center).1)
     }),
-    ("sealed-room", On::Any, sealed_room),
+    ("sealed-room", On::Any, |s| {
+        let (builder, camera) = sealed(1.0);
+        black(s, &builder.build(), &camera)
+    }),
     ("crack-of-2-cm", On::Any, |s| crack(s, 0.02)),
     ("crack-of-0.2-mm", On::Any, |s| crack(s, 2e-4)),
     ("empty-cells", On::Any, empty_cells),
@@ -122,11 +125,6 @@ fn camera_inside(setting: &Setting) -> Result<Outcome> {
     let world = builder.faces(&lambert(0.8), low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.25, 0.75, 0.25), Vec3::new(0.5, 0.5, 0.0), 1.0);
     black(setting, &world, &camera)
-}
-
-fn sealed_room(setting: &Setting) -> Result<Outcome> {
-    let (builder, camera) = sealed(1.0);
-    black(setting, &builder.build(), &camera)
 }
 
 fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {

@@ -15,6 +15,7 @@ use crate::image::{Image, sanitise};
 use crate::math::texel_solid_angle;
 use crate::metrics::hypothesis::chi_square_test;
 use crate::path::WorldBuilder;
+use crate::render::film::Film;
 use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::Camera;
@@ -47,13 +48,8 @@ fn noise(width: u32, height: u32, f: impl Fn(f32) -> f32) -> Image {
 }
 
 fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
-    Image::from_fn(
-        width,
-        height,
-        |x, y| {
-            if texels.contains(&(x, y)) { [3.0, 2.0, 1.0] } else { [0.0; 3] }
-        },
-    )
+    let rgb = |is_lit: bool| if is_lit { [3.0, 2.0, 1.0] } else { [0.0; 3] };
+    Image::from_fn(width, height, |x, y| rgb(texels.contains(&(x, y))))
 }
 
 /// A dim noisy sky with a sun of one texel above the horizon.
@@ -342,11 +338,7 @@ pub(super) fn bilinear(map: &Image, x: f64, y: f64) -> DVec3 {
 }
 
 /// A white floor under the map, on the device under test.
-fn floor(
-    setting: &Setting,
-    environment: &Environment,
-    samples: u32,
-) -> Result<crate::render::film::Film> {
+fn floor(setting: &Setting, environment: &Environment, samples: u32) -> Result<Film> {
     let world = WorldBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 10.0).build();
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 1e-3);
     let view = View { width: 8, height: 8, ..view(camera, Sampling::Plain, 1) };

@@ -50,10 +50,6 @@ pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (WorldBuilder, Came
     let at = |x: f32, y: f32, z: f32| center + Vec3::new(x, y, z) * scale;
     let walls = lambert(albedo);
     let (low, high) = (at(-2.0, 0.0, -1.5), at(2.0, 2.5, 1.5));
-    let frame = |builder: WorldBuilder, y: [f32; 2], z: [f32; 2]| {
-        let (corner, top, side) = (at(2.0, y[0], z[0]), at(2.0, y[1], z[0]), at(2.0, y[0], z[1]));
-        builder.quad(&walls, corner, top - corner, side - corner)
-    };
     let mut builder = WorldBuilder::default().faces(&walls, low, high, 1..6);
     for (y, z) in [
         ([0.0, 0.75], [-1.5, 1.5]),
@@ -61,7 +57,8 @@ pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (WorldBuilder, Came
         ([0.75, 2.25], [-1.5, -1.0]),
         ([0.75, 2.25], [1.0, 1.5]),
     ] {
-        builder = frame(builder, y, z);
+        let (corner, top, side) = (at(2.0, y[0], z[0]), at(2.0, y[1], z[0]), at(2.0, y[0], z[1]));
+        builder = builder.quad(&walls, corner, top - corner, side - corner);
     }
     let block = lambert(0.5 * albedo);
     let builder =
