@@ -96,12 +96,19 @@ impl<'a> Place<'a> {
             next = next.max(elapsed / STEP) * STEP;
         }
         let session = driver.session;
+        let figures = session.figures();
         let run = Run {
             method: method.name.clone(),
             seed,
             table_seconds: self.table_seconds,
-            figures: session.figures(),
-            memory: self.memory(&session),
+            figures,
+            memory: Memory {
+                table_bytes: self.environment.memory_bytes().table as u64,
+                bvh_bytes: self.world.bvh.memory_bytes() as u64,
+                grid_peak_bytes: figures.grid_peak_bytes as u64,
+                grid_bytes: figures.grid_bytes as u64,
+                device_bytes: session.gpu_figures().map(|gpu| gpu.device_bytes),
+            },
             nanoseconds_per_ray: None,
             points,
             denoised_flip: None,
@@ -109,16 +116,6 @@ impl<'a> Place<'a> {
         };
         let denoised = quick(session.film(), None);
         Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
-    }
-
-    fn memory(&self, session: &Session<'_>) -> Memory {
-        Memory {
-            table_bytes: self.environment.memory_bytes().table as u64,
-            bvh_bytes: self.world.bvh.memory_bytes() as u64,
-            grid_peak_bytes: session.figures().grid_peak_bytes as u64,
-            grid_bytes: session.figures().grid_bytes as u64,
-            device_bytes: session.gpu_figures().map(|gpu| gpu.device_bytes),
-        }
     }
 }
 
