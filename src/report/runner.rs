@@ -14,7 +14,6 @@ use super::store::Store;
 use super::summary::{DeviceReport, Pictures, Report, RowReport, summarise};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
-use crate::image::Image;
 
 /// Measures the missing runs and writes `report.html`, `report.csv`, `report.json` and `plots/`; returns an
 /// unfinished report if it is cancelled.
@@ -27,7 +26,7 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
     let file_reference =
         plan.reference.as_deref().map(|path| read_reference(path, size)).transpose()?;
     let file_reference = file_reference.map(|image| {
-        let digest = digest_of(&image);
+        let digest = Digest::new().bytes(bytemuck::cast_slice(image.pixels.as_flattened()));
         (image, digest)
     });
     let store = Store::open(options.folder, options.references)?;
@@ -71,9 +70,10 @@ const PAGES_EVERY: Duration = Duration::from_secs(30);
 impl Runner<'_> {
     /// Measures a row and adds it to the report.
     fn row(&mut self, row: &Row) -> Result<()> {
-        let rows_after = self.context.plan.rows.len() - self.report.rows.len() - 1;
+        let Context { plan, store, devices, file_reference, .. } = &self.context;
+        let rows_after = plan.rows.len() - self.report.rows.len() - 1;
         self.context.say(&format!("{}: loading", row.title), 0.0, rows_after);
-        let prepared = PreparedRow::load(row, self.context.plan)?;
+        let prepared = PreparedRow::load(row, plan)?;
         let report = RowReport {
             row: row.clone(),
             notices: prepared.notices.iter().map(str::to_owned).collect(),
@@ -86,26 +86,19 @@ impl Runner<'_> {
             pictures: Pictures::default(),
         };
         self.report.rows.push(report);
-        let reference = self.context.file_reference.is_none().then(|| {
-            Reference::open(
-                &self.context.store.references,
-                prepared.digest,
-                self.context.plan.effort.frame.size,
-            )
-        });
+        let reference = file_reference
+            .is_none()
+            .then(|| Reference::open(&store.references, prepared.digest, plan.effort.frame.size));
         let mut state = RowState {
-            runs: vec![
-                vec![Vec::new(); self.context.plan.methods.len()];
-                self.context.devices.len()
-            ],
-            refusals: vec![None; self.context.devices.len()],
+            runs: vec![vec![Vec::new(); plan.methods.len()]; devices.len()],
+            refusals: vec![None; devices.len()],
             prepared,
             reference,
             rows_after,
         };
-        for device in 0..self.context.devices.len() {
-            let uploaded = state.prepared.upload(&self.context.devices[device]);
-            self.accept(&mut state, device, &uploaded);
+        for (index, device) in devices.iter().enumerate() {
+            let uploaded = state.prepared.upload(device);
+            self.accept(&mut state, index, &uploaded);
         }
         if state.refusals.iter().all(Option::is_some) {
             return self.update(&mut state);
@@ -132,10 +125,8 @@ impl Runner<'_> {
         for seed in 0..self.context.plan.effort.seeds {
             for device in 0..self.context.devices.len() {
                 for method in 0..self.context.plan.methods.len() {
-                    if state.refusals[device].is_some() {
-                        continue;
-                    }
-                    if !self.run(state, device, method, seed)? {
+                    let can_run = state.refusals[device].is_none();
+                    if can_run && !self.run(state, device, method, seed)? {
                         return Ok(false);
                     }
                 }
@@ -172,8 +163,7 @@ impl Runner<'_> {
         let on = &self.context.devices[device];
         if seed == 0 && on.gpu.is_none() {
             let (grid, seconds) = (done.grid.take(), seconds.min(1.0));
-            let nanoseconds = state.prepared.time_rays(on, settings, grid, seconds)?;
-            done.run.nanoseconds_per_ray = nanoseconds;
+            done.run.nanoseconds_per_ray = state.prepared.time_rays(on, settings, grid, seconds)?;
         }
         if let Some((reference, pictures)) = self.context.reference(state) {
             done.run.evaluate(&done.films, &done.denoised, &reference)?;
@@ -227,18 +217,15 @@ impl Runner<'_> {
     /// Removes all pictures but the last of each run. Denoised pictures are kept for the first runs, and for all
     /// runs if the reference is given, whose noise they estimate.
     fn remove_pictures(&self, state: &RowState) {
+        let Context { plan, store, file_reference, .. } = &self.context;
         for (key, run) in state.runs.iter().flatten().flatten() {
-            if run.seed > 0 && self.context.file_reference.is_none() {
-                self.context.store.remove_pictures(&denoised(key));
+            if run.seed > 0 && file_reference.is_none() {
+                store.remove_pictures(&denoised(key));
             }
-            let films = self
-                .context
-                .store
-                .read_pictures(key, self.context.plan.effort.frame.size)
-                .unwrap_or_default();
+            let films = store.read_pictures(key, plan.effort.frame.size).unwrap_or_default();
             if let [_, .., last] = films.as_slice() {
                 // A failure only leaves more pictures on the disk.
-                let _ = self.context.store.write_pictures(key, std::slice::from_ref(last));
+                let _ = store.write_pictures(key, std::slice::from_ref(last));
             }
         }
     }
@@ -254,16 +241,13 @@ impl Runner<'_> {
         let mut devices = Vec::new();
         for (index, device) in self.context.devices.iter().enumerate() {
             for (method, runs) in plan.methods.iter().zip(&state.runs[index]) {
-                if let Some(picture) =
-                    runs.first().and_then(|(key, _)| self.context.last_picture(key))
-                {
-                    pictures.runs.push((device.device, method.name.clone(), picture));
-                }
+                let picture = runs.first().and_then(|(key, _)| self.context.last_picture(key));
+                let named = picture.map(|picture| (device.device, method.name.clone(), picture));
+                pictures.runs.extend(named);
             }
-            let runs = state.runs[index]
-                .iter()
-                .map(|runs| runs.iter().map(|(_, run)| run.clone()).collect())
-                .collect();
+            let of_method =
+                |runs: &Vec<(String, Run)>| runs.iter().map(|(_, run)| run.clone()).collect();
+            let runs = state.runs[index].iter().map(of_method).collect();
             devices.push(DeviceReport {
                 device: device.device,
                 name: device.name.clone(),
@@ -317,9 +301,4 @@ pub fn check(plan: &Plan) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Digest of a given reference.
-fn digest_of(picture: &Image) -> Digest {
-    Digest::new().bytes(bytemuck::cast_slice(picture.pixels.as_flattened()))
 }
