@@ -319,16 +319,14 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
         }
         found
     };
-    let all_speed_ups: Vec<_> = (0..runs.len()).map(speed_ups).collect();
-    let rest = all_speed_ups.into_iter().zip(&bundles).zip(efficiencies.clone());
     runs.into_iter()
         .zip(&plan.methods)
-        .zip(rest)
-        .map(|((runs, method), ((speed_ups, bundles), efficiency))| MethodReport {
+        .enumerate()
+        .map(|(index, (runs, method))| MethodReport {
             method: method.clone(),
             errors: Measure::ALL
                 .into_iter()
-                .zip(bundles)
+                .zip(&bundles[index])
                 .filter_map(|(m, b)| Some((m, (*b.as_ref()?.estimates().last()?)?)))
                 .collect(),
             denoised_flip: estimate(&runs, |run| run.denoised_flip),
@@ -338,8 +336,10 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
                 .filter(|m| **m != Measure::Flip)
                 .filter_map(|m| Some((*m, estimate(&runs, |run| slope(run, *m))?)))
                 .collect(),
-            speed_ups,
-            without_learning: efficiencies[plan.baselines[0]].zip(efficiency).map(|(b, a)| b / a),
+            speed_ups: speed_ups(index),
+            without_learning: efficiencies[plan.baselines[0]]
+                .zip(efficiencies[index])
+                .map(|(baseline, own)| baseline / own),
             costs: costs(&runs, threads),
             memory: max_memory(&runs),
             runs,
