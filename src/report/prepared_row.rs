@@ -59,10 +59,8 @@ impl PreparedRow {
             lights.push(Light { options, environment, seconds, upload: None });
         }
         let aspect = plan.effort.frame.size.0 as f32 / plan.effort.frame.size.1 as f32;
-        let camera = match world.scene.cameras.first() {
-            Some(camera) => camera.clone(),
-            None => framing::frame(&world, aspect),
-        };
+        let camera = world.scene.cameras.first().cloned();
+        let camera = camera.unwrap_or_else(|| framing::frame(&world, aspect));
         let digest =
             digest::of_picture((&world, &lights[0].environment), &camera, &plan.effort.frame)?;
         let (title, frame) = (row.title.clone(), plan.effort.frame.clone());

@@ -299,12 +299,8 @@ pub(super) fn speed_up_plot(
             }
         }
     }
-    let Some(widest) = groups.iter().map(|group| group.title.chars().count()).max() else {
-        return Ok(None);
-    };
-    if names.is_empty() {
-        return Ok(None);
-    }
+    let widths = groups.iter().map(|group| group.title.chars().count());
+    let Some(widest) = widths.max().filter(|_| !names.is_empty()) else { return Ok(None) };
     // Without one each group is a single method, which its title names.
     let has_legend = groups.iter().any(|group| group.bars.len() > 1) || names.len() <= 4;
     let (top, gap) = if has_legend { (84.0, 14.0) } else { (40.0, 5.0) };
