@@ -99,10 +99,8 @@ impl Place<'_> {
     fn fill(&self, figures: &mut SceneFigures) -> Result<Compared> {
         let Subject { world, environment, .. } = self.subject;
         let start = Instant::now();
-        let uploaded = match &self.open.gpu {
-            Some(gpu) => Some(UploadedScene::new(gpu, world, environment)?),
-            None => None,
-        };
+        let upload = |gpu| UploadedScene::new(gpu, world, environment);
+        let uploaded = self.open.gpu.as_ref().map(upload).transpose()?;
         let upload_seconds = start.elapsed().as_secs_f64();
         figures.paths = Some(self.paths(uploaded.as_ref(), upload_seconds)?);
         let (rays, hits) = rays::measure(self, uploaded.as_ref())?;
@@ -234,14 +232,10 @@ fn compare(scene: &str, a: &Result<Compared>, b: &Result<Compared>) -> Parity {
         let pairs = pairs.map(|(a, b)| (luminance(a), luminance(b)));
         let apart = pairs.filter(|(a, b)| (a - b).abs() > 0.01 * a.max(*b)).count();
         let other = a.hits.iter().zip(&b.hits).filter(|(a, b)| a.1 != b.1).count();
-        Ok((
-            mean_ratio,
-            apart as f64 / a.picture.pixels.len() as f64,
-            other as f64 / a.hits.len().max(1) as f64,
-        ))
+        let share_apart = apart as f64 / a.picture.pixels.len() as f64;
+        Ok([mean_ratio, share_apart, other as f64 / a.hits.len().max(1) as f64])
     });
     let failure = judged.as_ref().err().map(ToString::to_string);
-    let (mean_ratio, share_apart, other_triangles) =
-        judged.unwrap_or((f64::NAN, f64::NAN, f64::NAN));
+    let [mean_ratio, share_apart, other_triangles] = judged.unwrap_or([f64::NAN; 3]);
     Parity { scene: scene.to_owned(), failure, mean_ratio, share_apart, other_triangles }
 }

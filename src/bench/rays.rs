@@ -69,15 +69,10 @@ pub(super) fn measure(
     uploaded: Option<&UploadedScene>,
 ) -> Result<(Vec<RayFigures>, Answers)> {
     let world = &place.subject.world;
-    let mut caster = match uploaded {
-        Some(uploaded) => {
-            // Kernels without environment sampling.
-            let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
-            let environment = &place.subject.environment;
-            Some(Caster::new(uploaded, (world, environment), &view)?)
-        }
-        None => None,
-    };
+    // Kernels without environment sampling.
+    let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
+    let lit = (world, &place.subject.environment);
+    let mut caster = uploaded.map(|uploaded| Caster::new(uploaded, lit, &view)).transpose()?;
     let mut figures = Vec::new();
     let mut hits = Vec::new();
     let primary = primary(place);
