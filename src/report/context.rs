@@ -10,6 +10,7 @@ use super::plan::{MIN_PICTURES, Method, Plan, Settings};
 use super::prepared_row::PreparedRow;
 use super::reference::Reference;
 use super::store::Store;
+use crate::denoise::Denoiser;
 use crate::digest::Digest;
 use crate::image::Image;
 
@@ -67,12 +68,13 @@ impl Context<'_> {
         self.options.cancel.load(Ordering::Relaxed)
     }
 
-    /// All pictures of a run, one for each point, and the denoised last one; `None` if some are missing.
-    pub(super) fn pictures(&self, key: &str, run: &Run) -> Option<(Vec<Image>, Image)> {
-        let size = self.plan.effort.frame.size;
-        let films = self.store.read_pictures(key, size)?;
-        let denoised = self.last_picture(&denoised(key))?;
-        (films.len() == run.points.len()).then_some((films, denoised))
+    /// All pictures of a run and the denoised ones, one for each point; `None` if some are missing.
+    pub(super) fn pictures(&self, key: &str, run: &Run) -> Option<[Vec<Image>; 2]> {
+        let read = |key: &str| {
+            let pictures = self.store.read_pictures(key, self.plan.effort.frame.size)?;
+            (pictures.len() == run.points.len()).then_some(pictures)
+        };
+        Some([read(key)?, read(&denoised(key))?])
     }
 
     /// The last of the pictures stored under a name.
@@ -96,6 +98,7 @@ impl Context<'_> {
         let device = &self.devices[device];
         let digest = self.machine_digest.debug(&state.prepared.digest).debug(&(
             &method.settings,
+            Denoiser::Best.name(),
             &device.name,
             self.plan.effort.seconds,
             seed,
@@ -135,7 +138,7 @@ impl Context<'_> {
     }
 }
 
-/// The name under which the denoised last picture of a run is stored.
+/// The name under which the denoised pictures of a run are stored.
 pub(super) fn denoised(key: &str) -> String {
     format!("{key}_denoised")
 }

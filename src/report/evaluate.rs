@@ -70,7 +70,7 @@ impl Context<'_> {
             if is_new {
                 continue;
             }
-            if let Some((films, denoised)) = self.pictures(key, run) {
+            if let Some([films, denoised]) = self.pictures(key, run) {
                 run.evaluate(&films, &denoised, &reference)?;
                 run.reference_pictures = pictures;
                 self.store.write(key, run)?;
@@ -196,8 +196,7 @@ fn smallest_error(state: &RowState) -> Option<f64> {
 /// Mean error at the end; NaN before errors are known.
 fn mean_error(runs: &[(String, Run)]) -> f64 {
     let error = |(_, run): &(String, Run)| {
-        let last = run.points.last().and_then(|p| p.errors);
-        last.map_or(f64::NAN, |errors| Measure::TrimmedRelMse.of(&errors))
+        run.points.last().and_then(|p| Measure::TrimmedRelMse.of(p)).unwrap_or(f64::NAN)
     };
     runs.iter().map(error).sum::<f64>() / runs.len() as f64
 }

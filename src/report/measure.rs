@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::plan::{Frame, Method, Settings};
-use crate::denoise::quick;
+use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
@@ -56,7 +56,7 @@ impl<'a> Place<'a> {
         Ok(driver.learn(self.cancel)?.then_some(driver))
     }
 
-    /// Runs a method for `seconds`; `None` if it was cancelled. The time of copying pictures does not count.
+    /// Runs a method for `seconds`; `None` if it was cancelled. The time of copying and denoising pictures does not count.
     pub(super) fn measure(
         &self,
         method: &Method,
@@ -68,7 +68,7 @@ impl<'a> Place<'a> {
         if !driver.learn(self.cancel)? {
             return Ok(None);
         }
-        let (mut points, mut films) = (Vec::new(), Vec::new());
+        let (mut points, mut films, mut denoised) = (Vec::new(), Vec::new(), Vec::new());
         let mut next = seconds * FIRST_SHARE;
         loop {
             driver.advance(self.cancel)?;
@@ -88,8 +88,10 @@ impl<'a> Place<'a> {
                 samples: session.samples(),
                 rays: figures.rays,
                 errors: None,
+                denoised_flip: None,
             });
             films.push(session.film().image());
+            denoised.push(Denoiser::Best.finish(session.film(), None)?);
             if elapsed >= seconds {
                 break;
             }
@@ -111,10 +113,8 @@ impl<'a> Place<'a> {
             },
             nanoseconds_per_ray: None,
             points,
-            denoised_flip: None,
             reference_pictures: None,
         };
-        let denoised = quick(session.film(), None);
         Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
     }
 }
@@ -132,6 +132,8 @@ pub struct Point {
     pub rays: u64,
     /// Errors against the reference; `None` before there is one.
     pub errors: Option<Comparison>,
+    /// Mean LDR-FLIP of the denoised picture; `None` before there is a reference.
+    pub denoised_flip: Option<f64>,
 }
 
 /// Memory that a run holds, in bytes.
@@ -166,8 +168,6 @@ pub struct Run {
     pub nanoseconds_per_ray: Option<f64>,
     /// In order of time; the last one is at or after the end.
     pub points: Vec<Point>,
-    /// Mean LDR-FLIP of the last picture through the built-in denoiser.
-    pub denoised_flip: Option<f64>,
     /// Pictures of the reference that errors were taken against.
     pub reference_pictures: Option<u32>,
 }
@@ -176,8 +176,8 @@ pub struct Run {
 pub(super) struct Finished {
     pub(super) run: Run,
     pub(super) films: Vec<Image>,
-    /// The last one, denoised.
-    pub(super) denoised: Image,
+    /// The same without noise.
+    pub(super) denoised: Vec<Image>,
     /// The learned grid, for measurements after the run.
     pub(super) grid: Option<LightGrid>,
 }
@@ -189,20 +189,20 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 const FIRST_SHARE: f64 = 1.0 / 256.0;
 
 impl Run {
-    /// Computes the errors of its pictures, one for each point, and of the denoised last one.
+    /// Computes the errors of its pictures and of the denoised ones, one for each point.
     ///
     /// # Errors
     /// If the reference is black or a picture is not finite.
     pub(super) fn evaluate(
         &mut self,
         films: &[Image],
-        denoised: &Image,
+        denoised: &[Image],
         reference: &Image,
     ) -> Result<()> {
-        for (point, film) in self.points.iter_mut().zip(films) {
+        for (point, (film, denoised)) in self.points.iter_mut().zip(films.iter().zip(denoised)) {
             point.errors = Some(compare(film, reference)?);
+            point.denoised_flip = compare(denoised, reference)?.flip;
         }
-        self.denoised_flip = compare(denoised, reference)?.flip;
         Ok(())
     }
 }

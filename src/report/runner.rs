@@ -171,7 +171,7 @@ impl Runner<'_> {
         }
         // Pictures first: a run without them is measured again.
         self.context.store.write_pictures(&key, &done.films)?;
-        self.context.store.write_pictures(&denoised(&key), &[done.denoised])?;
+        self.context.store.write_pictures(&denoised(&key), &done.denoised)?;
         self.context.store.write(&key, &done.run)?;
         state.runs[device][method].push((key, done.run));
         if self.pages_written.is_none_or(|at| at.elapsed() > PAGES_EVERY) {

@@ -120,6 +120,14 @@ impl Bundle {
         mean
     }
 
+    /// Seconds from which on the mean error stays at or below `error`, and whether that is the first time; `None` if it
+    /// is above at the end.
+    pub(super) fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
+        let mean = self.mean(&(0..self.errors.len()).collect::<Vec<_>>());
+        let is_reached = mean.last().is_some_and(|last| *last <= error);
+        is_reached.then(|| time_to(&self.seconds, &mean, error))
+    }
+
     /// Mean error and its standard error at every time.
     pub fn estimates(&self) -> Vec<Option<Estimate>> {
         (0..self.seconds.len())

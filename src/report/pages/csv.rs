@@ -9,7 +9,7 @@ use super::super::summary::Report;
 pub(super) fn table(report: &Report) -> String {
     let mut text = String::from(
         "row,scene,map,device,method,seed,seconds,render_seconds,samples_per_pixel,rays,mse,\
-         rel_mse,trimmed_rel_mse,block_rel_mse,flip,mean_ratio\n",
+         rel_mse,trimmed_rel_mse,block_rel_mse,flip,mean_ratio,denoised_flip\n",
     );
     for row in &report.rows {
         for device in &row.devices {
@@ -25,7 +25,7 @@ pub(super) fn table(report: &Report) -> String {
                 for run in &method.runs {
                     for point in &run.points {
                         let errors = point.errors.map_or_else(
-                            || ",,,,,".to_owned(),
+                            || ",,,,,,".to_owned(),
                             |e| {
                                 let values = [
                                     e.mse,
@@ -34,6 +34,7 @@ pub(super) fn table(report: &Report) -> String {
                                     e.block_rel_mse,
                                     e.flip.unwrap_or(f64::NAN),
                                     e.mean_ratio,
+                                    point.denoised_flip.unwrap_or(f64::NAN),
                                 ];
                                 values.map(|v| v.to_string()).join(",")
                             },

@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
+use super::super::plan::Method;
+use super::super::summary::{CLEAN_FLIP, DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::format::{percent, ratio, speed_up_cell, verdict};
+use crate::denoise::Denoiser;
 
 /// The table of speed-ups: a line for each row and device.
 pub(super) struct Table<'a> {
@@ -50,14 +52,57 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Speed-ups of all rows as a Markdown table.
+/// Names of the columns of seconds to clean pictures.
+pub(super) fn clean_head(report: &Report) -> Vec<&str> {
+    let methods = report.plan.methods.iter().map(|method| method.name.as_str());
+    ["row", "device"].into_iter().chain(methods).collect()
+}
+
+/// A device's line of seconds to denoised pictures of each [`CLEAN_FLIP`]; "-" where the last picture is not as good.
+pub(super) fn clean_cells(report: &Report, row: &RowReport, device: &DeviceReport) -> Vec<String> {
+    let cell = |method: &Method| {
+        let method = device.method(&method.name);
+        let seconds =
+            method.map_or([None; 3], |method| method.clean_seconds).map(|reached| match reached {
+                None => "-".to_owned(),
+                Some((seconds, is_bound)) => {
+                    format!("{}{}", if is_bound { "≤ " } else { "" }, ratio(seconds))
+                }
+            });
+        seconds.join(" / ")
+    };
+    let names = [row.row.title.clone(), device.device.title().to_owned()];
+    names.into_iter().chain(report.plan.methods.iter().map(cell)).collect()
+}
+
+/// Speed-ups of all rows and, of few methods, seconds to clean pictures, as Markdown tables.
 pub fn markdown_table(report: &Report) -> String {
     let table = Table::new(report);
-    let mut text = format!("| {} |\n", table.head.join(" | "));
-    let _ = writeln!(text, "|{}", "---|".repeat(table.head.len()));
+    let mut text = markdown(report, &table.head, |row, device| table.cells(row, device));
+    if !report.is_long() {
+        let _ = write!(text, "\n{}:\n\n", clean_title());
+        let cells = |row: &_, device: &_| clean_cells(report, row, device);
+        text += &markdown(report, &clean_head(report), cells);
+    }
+    text
+}
+
+/// What the table of seconds to clean pictures is called.
+pub(super) fn clean_title() -> String {
+    let flips = CLEAN_FLIP.map(|flip| format!("{flip:.2}")).join(" / ");
+    format!("Seconds to FLIP {flips} of pictures denoised by {}", Denoiser::Best.name())
+}
+
+fn markdown(
+    report: &Report,
+    head: &[&str],
+    cells: impl Fn(&RowReport, &DeviceReport) -> Vec<String>,
+) -> String {
+    let mut text = format!("| {} |\n", head.join(" | "));
+    let _ = writeln!(text, "|{}", "---|".repeat(head.len()));
     for row in &report.rows {
         for device in &row.devices {
-            let _ = writeln!(text, "| {} |", table.cells(row, device).join(" | "));
+            let _ = writeln!(text, "| {} |", cells(row, device).join(" | "));
         }
     }
     text

@@ -57,6 +57,10 @@ fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
     let table = text(&output.stdout);
     assert!(table.contains("| scene.gltf / map.exr | CPU |"), "{table}");
     assert!(text(&output.stderr).contains("2 methods x 2 runs of 0.4 s"));
+    assert!(
+        table.contains("Seconds to FLIP 0.10 / 0.07 / 0.05 of pictures denoised by"),
+        "{table}"
+    );
 
     let json = bench.json("out/report.json");
     assert_eq!(json["is_finished"], true);
@@ -79,6 +83,9 @@ fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
             assert!(seconds.is_sorted() && seconds.last().is_some_and(|s| *s >= 0.4));
             assert!(points.iter().all(|p| number(&p["errors"]["flip"]) >= 0.0));
             assert!(points.iter().all(|p| number(&p["errors"]["mse"]) > 0.0));
+            // The first picture is the noisiest, and without noise it is nearer to the reference.
+            let flips = (number(&points[0]["errors"]["flip"]), number(&points[0]["denoised_flip"]));
+            assert!(flips.1 < flips.0, "{flips:?}");
             if method["method"]["name"] == "plain" {
                 // Without learning even a run this short has enough points; Sobol's are a little steeper.
                 let [first, last] = [&points[0], &points[points.len() - 1]];
