@@ -122,7 +122,7 @@ impl Bundle {
 
     /// Seconds from which on the mean error stays at or below `error`, and whether that is the first time; `None` if it
     /// is above at the end.
-    pub(super) fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
+    pub fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
         let mean = self.mean(&(0..self.errors.len()).collect::<Vec<_>>());
         let is_reached = mean.last().is_some_and(|last| *last <= error);
         is_reached.then(|| time_to(&self.seconds, &mean, error))

@@ -66,6 +66,10 @@ fn what_is_better_from_the_start_gives_a_bound() {
     let found = SpeedUp::new(&baseline, &method).expect("a ratio");
     assert!(found.is_bound, "{found:?}");
     assert!((found.ratio - 5.0).abs() < 1e-9, "{found:?}");
+    let (seconds, is_bound) = baseline.seconds_to(0.2).expect("it falls to 0.1");
+    assert!((seconds - 5.0).abs() < 1e-6 && !is_bound, "{seconds}");
+    assert_eq!(baseline.seconds_to(0.05), None);
+    assert!(baseline.seconds_to(20.0).is_some_and(|(_, is_bound)| is_bound));
     assert_eq!(Bundle::new(&[curve(11.0, 20.0, |t| 1.0 / t)], 10.0), None, "no picture in time");
 }
 
