@@ -22,15 +22,15 @@ use crate::sources;
 pub struct LoadedScene {
     /// What was asked for.
     pub name: String,
-    /// The scene, with these changes.
+    /// The scene with `changes` applied.
     pub world: Arc<World>,
-    /// What they are.
+    /// Changes to the file's scene.
     pub changes: SceneChanges,
     /// Its materials without them.
     pub materials: Arc<[Material]>,
     /// Its point, spot and directional lights without them.
     pub lights: Arc<[PunctualLight]>,
-    /// The first of these of each name.
+    /// One of these for each name: the first.
     pub named_lamps: Arc<[PunctualLight]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
@@ -210,8 +210,8 @@ pub struct Loader {
     in_flight: [Option<InFlight>; 2],
     /// So many were begun.
     begun: u64,
-    /// What is asked of scenes.
-    options: SceneOptions,
+    /// The scene that the window was opened with, and what is asked of it.
+    first: (String, SceneOptions),
     /// One scene and one map at a time, side by side as on the command line: two large scenes together
     /// may not fit into memory.
     turns: [Arc<Mutex<()>>; 2],
@@ -222,7 +222,8 @@ impl Loader {
     pub fn start(document: &Document, options: SceneOptions, wake: Wake) -> Self {
         let (sender, receiver) = channel();
         let (in_flight, turns) = ([None, None], Default::default());
-        let mut loader = Self { sender, receiver, wake, in_flight, begun: 0, options, turns };
+        let first = (document.scene.clone(), options);
+        let mut loader = Self { sender, receiver, wake, in_flight, begun: 0, first, turns };
         loader.load_scene(&document.scene);
         loader.load_map(&document.map, document.sun);
         loader
@@ -230,7 +231,12 @@ impl Loader {
 
     /// Starts to load a scene unless it is being loaded; a change to its materials is given up.
     pub fn load_scene(&mut self, name: &str) {
-        let (own, options) = (name.to_owned(), self.options.clone());
+        let (own, mut options) = (name.to_owned(), self.first.1.clone());
+        if self.first.0 != name {
+            // Its names are of another scene.
+            options =
+                SceneOptions { variant: None, hide: Vec::new(), edits: Vec::new(), ..options };
+        }
         self.spawn(Kind::Scene, name, false, move |steps| {
             Loaded::Scene(load_scene(&own, &options, steps))
         });

@@ -125,7 +125,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let document = &picture.document;
     let request = &picture.snapshot.request;
     let mut settings = settings_of(&request.view, &request.world);
-    let lamp_edits = document.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
+    let lamp_edits = picture.scene.changes.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
     let lamp_edits: Vec<String> = lamp_edits.collect();
     settings.extend([
         ("env_rotation_degrees", json!(document.rotation_degrees)),

@@ -75,6 +75,7 @@ impl App {
             Some(_) => self.interface.compared = Chosen::default(),
             None => {}
         }
+        forget_lamps(&mut self.edited, &scene, &mut self.messages);
         self.assets.scene = Some(scene);
         fill_in_viewpoint(&mut self.edited, &self.assets, &mut self.messages);
         if is_first {
@@ -297,6 +298,17 @@ impl App {
     fn inspect(&mut self) {
         let seen = self.seen().cloned();
         self.rendering.inspector.update(&self.interface, seen.as_ref());
+    }
+}
+
+/// Drops changes to lamps that a scene does not have, and says so.
+fn forget_lamps(edited: &mut Edited, scene: &LoadedScene, messages: &mut Messages) {
+    let has = |name: &String| scene.named_lamps.iter().any(|lamp| lamp.name == *name);
+    let gone: Vec<_> =
+        edited.document.lamp_edits.keys().filter(|name| !has(name)).cloned().collect();
+    for name in gone {
+        messages.notice(format!("{}: no lamp is called {name}, which was to change", scene.name));
+        edited.put_back(|document| document.lamp_edits.retain(|other, _| *other != name));
     }
 }
 

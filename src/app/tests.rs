@@ -13,6 +13,7 @@ use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
 use super::edited;
 use super::interface::{Dock, Interface, Tab};
+use super::loader::{Loaded, Loader};
 use super::overlays::{Legend, Overlay};
 use super::reload::Reload;
 use super::screenshot::{Shot, Studio};
@@ -22,7 +23,7 @@ use crate::memory;
 use crate::path::Background;
 use crate::render::StopRule;
 use crate::render::gpu::DeviceChoice;
-use crate::scene::{LampEdit, MaterialEdit, Medium};
+use crate::scene::{LampEdit, MaterialEdit, Medium, SceneOptions};
 use crate::tone::WhiteBalance;
 
 fn studio(scene: &str) -> Option<Studio> {
@@ -576,4 +577,40 @@ fn messages_lie_on_the_picture_alone() {
             assert!(screen.contains_rect(messages), "{size:?}, {dock:?}: {messages}");
         }
     }
+}
+
+/// Names of materials and lamps on the command line are those of the scene there, and of no other one.
+#[test]
+fn what_is_asked_of_one_scene_is_not_asked_of_others() {
+    let hide = vec!["no such material".to_owned()];
+    let options = SceneOptions { hide, ..SceneOptions::default() };
+    let document = Document { scene: "crack".to_owned(), ..Document::default() };
+    let mut loader = Loader::start(&document, options, Arc::new(|| ()));
+    let mut next = |name: &str| {
+        loader.load_scene(name);
+        loop {
+            for (found, loaded) in loader.take() {
+                if let Loaded::Scene(scene) = loaded
+                    && found == name
+                {
+                    return scene.map(|scene| scene.name);
+                }
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    assert!(next("crack").is_err_and(|error| error.to_string().contains("no such material")));
+    assert_eq!(next("open").ok(), Some("open".to_owned()));
+}
+
+#[test]
+fn lamps_that_a_scene_does_not_have_are_said_and_forgotten() {
+    let Some(mut studio) = studio("crack") else { return };
+    let edit = LampEdit { off: true, ..LampEdit::default() };
+    studio.app.edited.document.lamp_edits.insert("rim".to_owned(), edit);
+    studio.app.assets.loader.load_scene("crack");
+    studio.settle().expect("rendered");
+    assert!(studio.app.edited.document.lamp_edits.is_empty());
+    let said: Vec<_> = studio.app.messages.list.iter().map(|it| &*it.sentence).collect();
+    assert!(said.iter().any(|it| it.contains("no lamp is called rim")), "{said:?}");
 }

@@ -128,9 +128,8 @@ struct Collapse<'a> {
     weighing: &'a Weighing<'a>,
     nodes: Vec<Node>,
     blocks: Vec<Block>,
-    /// Nodes at this depth are left to others...
+    /// Depth at which subtrees are not written here but listed in `subtrees`.
     levels: usize,
-    /// ...which are these.
     subtrees: Vec<Subtree>,
 }
 
@@ -345,6 +344,16 @@ mod tests {
             println!("{count} triangles {step} apart: {seconds:.2} s");
             assert!(seconds < 40.0, "{step}: {seconds}");
         }
+    }
+
+    /// Boxes of triangles whose areas are more than f32 can hold are no reason to make one block of many.
+    #[test]
+    fn huge_slivers_are_spread_over_blocks() {
+        let corner = |i: u16| 1e25 * Vec3::new(1.0, 1.0, 0.0) + 1e20 * f32::from(i) * Vec3::X;
+        let positions: Vec<_> =
+            (0..100).flat_map(|i| [-corner(i), corner(i), 1e12 * Vec3::Z - corner(i)]).collect();
+        let triangles: Vec<_> = (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        check(&positions, &triangles);
     }
 
     /// Triangles around the origin that grow by a constant factor nest like an onion: the cheapest

@@ -37,7 +37,8 @@ impl SubtreeCosts {
     }
 }
 
-/// Choices at one node of the binary tree: the first bit, then fours of bits for 2 to 8 slots and for 1 to 7.
+/// Choices at one node of the binary tree. Bit 0: the subtree is a block. Bits 8 to 35: for each of 2 to 8 slots how
+/// many the left child gets, four bits each. Bits 36 to 63: for each of 1 to 7 slots how many are used.
 #[derive(Clone, Copy)]
 pub(super) struct Choices(u64);
 
@@ -135,8 +136,9 @@ impl<'a> Weighing<'a> {
         let as_block = if count as usize <= WIDTH { area * BLOCK_COST } else { f32::INFINITY };
         let mut forest = [as_node.min(as_block); WIDTH - 1];
         let mut used = 1;
-        let mut choices =
-            u64::from(as_block <= as_node) | (of_left as u64) << (4 * WIDTH) | 1 << 36;
+        // Costs may be infinite where coordinates are huge.
+        let is_block = count as usize <= WIDTH && as_block <= as_node;
+        let mut choices = u64::from(is_block) | (of_left as u64) << (4 * WIDTH) | 1 << 36;
         for slots in 2..WIDTH {
             let (cost, of_left) = SubtreeCosts::split(left, right, slots);
             // Slots that do not lower the cost stay unused.

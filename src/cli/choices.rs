@@ -14,7 +14,7 @@ use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Gi, Sampling, Sharing};
 #[cfg(feature = "report")]
 use crate::report::Device;
-use crate::scene::{LampEdit, Lamps, MaterialEdit, Outlines, SceneOptions};
+use crate::scene::{LampEdit, LampEdits, Lamps, MaterialEdit, Outlines, SceneOptions};
 use crate::tone::ToneCurve;
 
 /// What is asked of a scene's file.
@@ -56,6 +56,18 @@ impl SceneArguments {
     /// Changes to lamps, as they were typed.
     pub(super) fn lamp_edits(&self) -> Vec<String> {
         self.lamp_edits.iter().map(|(name, edit)| edit.to_text(name)).collect()
+    }
+
+    /// What a window asks of the file, and changes to lamps, which it can change further.
+    #[cfg(feature = "window")]
+    pub(super) fn of_window(&self, outputs: Vec<PathBuf>) -> (SceneOptions, LampEdits) {
+        let mut options = self.options_beside(outputs);
+        let mut by_name = LampEdits::new();
+        for (name, edit) in options.lamp_edits.drain(..) {
+            let known = by_name.entry(name).or_default();
+            *known = known.then(&edit);
+        }
+        (options, by_name)
     }
 
     pub(super) fn options(&self) -> SceneOptions {

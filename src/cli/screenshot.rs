@@ -161,7 +161,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         Exposure::Auto => (true, 0.0),
         Exposure::Stops(stops) => (false, stops),
     };
+    let (of_scene, lamp_edits) = arguments.of_scene.of_window(vec![arguments.output.clone()]);
     let document = Document {
+        lamp_edits,
         scene: arguments.scene.clone(),
         map: arguments.env.clone().unwrap_or_else(|| builtin::sky(&arguments.scene).to_owned()),
         rotation_degrees: arguments.env_rotation.rem_euclid(360.0) as f32,
@@ -182,7 +184,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
             document,
             place: arguments.place.start_view()?,
             interface: interface(arguments),
-            of_scene: arguments.of_scene.options_beside(vec![arguments.output.clone()]),
+            of_scene,
             adapter: arguments.adapter.clone(),
             ..Start::default()
         },

@@ -77,12 +77,13 @@ impl ViewArguments {
 pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let path = arguments.settings.clone().or_else(Settings::default_path);
     let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
+    let (of_scene, lamp_edits) = arguments.of_scene.of_window(Vec::new());
     let start = Start {
-        document: document(arguments, &settings),
+        document: Document { lamp_edits, ..document(arguments, &settings) },
         place: arguments.place.start_view()?,
         interface: settings.interface(),
         settings,
-        of_scene: arguments.of_scene.options(),
+        of_scene,
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         pictures: Settings::pictures_folder(arguments.settings.as_deref()),

@@ -1,4 +1,4 @@
-//! The sun of a map: its brightest place, its scaling, and rectangles of equal energy.
+//! The sun of a map: its brightest place and its scaling.
 
 use glam::{DVec3, Vec3};
 

@@ -176,7 +176,7 @@ pub struct Run {
 pub(super) struct Finished {
     pub(super) run: Run,
     pub(super) films: Vec<Image>,
-    /// The same without noise.
+    /// The same pictures, denoised.
     pub(super) denoised: Vec<Image>,
     /// The learned grid, for measurements after the run.
     pub(super) grid: Option<LightGrid>,

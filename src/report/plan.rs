@@ -254,6 +254,6 @@ impl Plan {
 /// Duration of splitting one method's error by its sources, in durations of a run.
 pub(super) const SHARE_RUNS: f64 = 1.5;
 
-/// Ratio of the total time to that of runs: loading, building, comparing, writing, and passes that end late.
+/// Ratio of the total time to that of runs: loading, building, denoising, comparing, writing, and passes that end late.
 /// *Measured* on two cores.
-const OVERHEAD: f64 = 1.1;
+const OVERHEAD: f64 = 1.25;

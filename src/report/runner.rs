@@ -214,14 +214,11 @@ impl Runner<'_> {
         is_one
     }
 
-    /// Removes all pictures but the last of each run. Denoised pictures are kept for the first runs, and for all
-    /// runs if the reference is given, whose noise they estimate.
+    /// Removes all pictures but the last of each run.
     fn remove_pictures(&self, state: &RowState) {
-        let Context { plan, store, file_reference, .. } = &self.context;
-        for (key, run) in state.runs.iter().flatten().flatten() {
-            if run.seed > 0 && file_reference.is_none() {
-                store.remove_pictures(&denoised(key));
-            }
+        let Context { plan, store, .. } = &self.context;
+        for (key, _) in state.runs.iter().flatten().flatten() {
+            store.remove_pictures(&denoised(key));
             let films = store.read_pictures(key, plan.effort.frame.size).unwrap_or_default();
             if let [_, .., last] = films.as_slice() {
                 // A failure only leaves more pictures on the disk.

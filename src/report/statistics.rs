@@ -120,7 +120,7 @@ impl Bundle {
         mean
     }
 
-    /// Seconds from which on the mean error stays at or below `error`, and whether that is the first time; `None` if it
+    /// Seconds from which on the mean error stays at or below `error`, and whether it is so at the first measured time; `None` if it
     /// is above at the end.
     pub fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
         let mean = self.mean(&(0..self.errors.len()).collect::<Vec<_>>());

@@ -37,6 +37,12 @@ impl LampEdit {
         PunctualLight { intensity: intensity * factor, ..light.clone() }
     }
 
+    /// This change and then another one.
+    pub fn then(&self, next: &Self) -> Self {
+        let factor = (self.factor * next.factor).min(Self::MAX_FACTOR);
+        Self { off: self.off || next.off, factor, color: next.color.or(self.color) }
+    }
+
     /// Whether all numbers are in range.
     pub fn is_sound(&self) -> bool {
         let mut color = self.color.iter().flat_map(Vec3::to_array);
@@ -56,7 +62,11 @@ impl LampEdit {
             match change.trim().split_once('=').unwrap_or((change.trim(), "")) {
                 ("off", "") => edit.off = true,
                 ("factor", value) => edit.factor = number_up_to(Self::MAX_FACTOR, value)?,
-                ("color", value) => edit.color = Some(color_of_hex(value.trim())?),
+                ("color", value) => {
+                    let color = color_of_hex(value.trim())?;
+                    let color = Some(color).filter(|color| *color != Vec3::ZERO);
+                    edit.color = Some(color.ok_or("a lamp's color is not black: use off")?);
+                }
                 (other, _) => return Err(format!("{other} is not factor, color or off")),
             }
         }
@@ -88,6 +98,7 @@ mod tests {
         assert!(refused("Spot:power=1").contains("power is not factor"));
         assert!(refused("Spot:factor=-1").contains("-1 is no number from 0 to 1000000"));
         assert!(refused("Spot:off=1").contains("off is not factor"));
+        assert!(refused("Spot:color=#000000").contains("use off"));
     }
 
     #[test]
@@ -106,6 +117,9 @@ mod tests {
         assert_eq!(changed(LampEdit { factor: 0.5, ..none }), Vec3::new(0.5, 2.0, 1.0));
         let color = Some(Vec3::new(0.5, 0.25, 0.0));
         assert_eq!(changed(LampEdit { color, ..none }), Vec3::new(4.0, 2.0, 0.0));
-        assert_eq!(changed(LampEdit { off: true, ..none }), Vec3::ZERO);
+        let off = LampEdit { off: true, ..none };
+        assert_eq!(changed(off), Vec3::ZERO);
+        let half = LampEdit { factor: 0.5, color, ..none };
+        assert_eq!(half.then(&half).then(&off), LampEdit { off: true, factor: 0.25, color });
     }
 }

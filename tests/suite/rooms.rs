@@ -132,11 +132,11 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11463),
+    ("app", 11480),
     ("bench", 567),
     ("bsdf", 1498),
     ("bvh", 1421),
-    ("cli", 3435),
+    ("cli", 3448),
     ("color", 27),
     ("denoise", 1024),
     ("develop", 422),
@@ -161,7 +161,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6485),
     ("report", 3081),
     ("sampler", 143),
-    ("scene", 9898),
+    ("scene", 9906),
     ("shaders", 6187),
     ("sources", 127),
     ("stability", 1815),

@@ -58,12 +58,15 @@ fn row(ui: &mut Ui, lamp: &PunctualLight, edit: &mut LampEdit) {
         });
         let own = lamp.intensity / lamp.intensity.max_element().max(f32::MIN_POSITIVE);
         let mut rgb = edit.color.unwrap_or(own).to_array();
-        if ui.color_edit_button_rgb(&mut rgb).on_hover_text("Colour of its light").changed() {
-            edit.color = Some(Vec3::from(rgb).clamp(Vec3::ZERO, Vec3::ONE));
+        let patch = ui.color_edit_button_rgb(&mut rgb).on_hover_text("Colour of its light");
+        let rgb = Vec3::from(rgb).clamp(Vec3::ZERO, Vec3::ONE);
+        // Black has no colour: the box switches it off.
+        if patch.changed() && rgb != Vec3::ZERO {
+            edit.color = Some(rgb);
         }
         late(ui, "factor", &mut edit.factor, |ui, value| {
             let range = 0.0..=LampEdit::MAX_FACTOR;
-            let number = DragValue::new(value).range(range).speed(0.02).max_decimals(2);
+            let number = DragValue::new(value).range(range).speed(0.02).max_decimals(6);
             ui.add(number.prefix("× ")).on_hover_text("Brightness: drag, or click and type")
         });
     });

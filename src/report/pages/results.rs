@@ -58,17 +58,20 @@ pub(super) fn clean_head(report: &Report) -> Vec<&str> {
     ["row", "device"].into_iter().chain(methods).collect()
 }
 
-/// A device's line of seconds to denoised pictures of each [`CLEAN_FLIP`]; "-" where the last picture is not as good.
+/// A device's line of seconds to denoised pictures of each [`CLEAN_FLIP`]: "-" where the last picture is not as good,
+/// nothing before errors are known.
 pub(super) fn clean_cells(report: &Report, row: &RowReport, device: &DeviceReport) -> Vec<String> {
     let cell = |method: &Method| {
-        let method = device.method(&method.name);
-        let seconds =
-            method.map_or([None; 3], |method| method.clean_seconds).map(|reached| match reached {
-                None => "-".to_owned(),
-                Some((seconds, is_bound)) => {
-                    format!("{}{}", if is_bound { "≤ " } else { "" }, ratio(seconds))
-                }
-            });
+        let known = device.method(&method.name);
+        let Some(known) = known.filter(|m| m.error(Measure::DenoisedFlip).is_some()) else {
+            return String::new();
+        };
+        let seconds = known.clean_seconds.map(|reached| match reached {
+            None => "-".to_owned(),
+            Some((seconds, is_bound)) => {
+                format!("{}{}", if is_bound { "≤ " } else { "" }, ratio(seconds))
+            }
+        });
         seconds.join(" / ")
     };
     let names = [row.row.title.clone(), device.device.title().to_owned()];
