@@ -8,7 +8,9 @@ use crate::error::{At as _, Error, Notices, Result};
 use crate::image::Image;
 use crate::image::{extension, looks_like_picture, looks_like_scene, open_file, read_map};
 use crate::memory;
-use crate::scene::{Scene, SceneOptions, builtin, gltf};
+use crate::scene::{
+    LampEdit, Material, MaterialEdit, PunctualLight, Scene, SceneOptions, builtin, gltf,
+};
 
 /// Size of a built-in sky when none is asked for.
 const SKY_SIZE: (u32, u32) = (2048, 1024);
@@ -39,30 +41,39 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     } else {
         gltf::load_with(Path::new(name), options)?
     };
-    for (material, edit) in &options.edits {
-        let mut is_there = false;
-        for changed in scene.materials.iter_mut().filter(|m| m.name == *material) {
-            *changed = edit.apply(changed);
-            is_there = true;
-        }
-        if !is_there {
-            return Err(Error::at(name, scene.without_material(material)));
-        }
-    }
-    for (lamp, edit) in &options.lamp_edits {
-        let mut is_there = false;
-        for changed in scene.lights.iter_mut().filter(|light| light.name == *lamp) {
-            *changed = edit.apply(changed);
-            is_there = true;
-        }
-        if !is_there {
-            return Err(Error::at(name, scene.without_lamp(lamp)));
-        }
-    }
+    let is_called = |material: &Material, name: &str| material.name == name;
+    change(&mut scene.materials, &options.edits, is_called, MaterialEdit::apply)
+        .map_err(|missing| Error::at(name, scene.without_material(missing)))?;
+    let is_called = |light: &PunctualLight, name: &str| light.name == name;
+    change(&mut scene.lights, &options.lamp_edits, is_called, LampEdit::apply)
+        .map_err(|missing| Error::at(name, scene.without_lamp(missing)))?;
     if options.edits.iter().any(|(_, edit)| edit.hidden) {
         scene.check_shown().at(name)?;
     }
     Ok(scene)
+}
+
+/// Applies each edit to all things of its name, in order.
+///
+/// # Errors
+/// The first name that nothing has.
+fn change<'n, Thing, Edit>(
+    all: &mut [Thing],
+    edits: &'n [(String, Edit)],
+    is_called: impl Fn(&Thing, &str) -> bool,
+    apply: impl Fn(&Edit, &Thing) -> Thing,
+) -> std::result::Result<(), &'n str> {
+    for (name, edit) in edits {
+        let mut is_there = false;
+        for thing in all.iter_mut().filter(|thing| is_called(thing, name)) {
+            *thing = apply(edit, thing);
+            is_there = true;
+        }
+        if !is_there {
+            return Err(name);
+        }
+    }
+    Ok(())
 }
 
 /// Whether a name is that of a built-in scene and of no file.

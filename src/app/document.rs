@@ -157,7 +157,8 @@ impl Document {
 
     /// Whether both show the same from the same place, whatever is made of it.
     pub(super) fn shows_like(&self, other: &Self) -> bool {
-        let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
+        let light =
+            |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.lamps, of.light.bounces);
         let things = |of: &Self| (of.background, of.fog);
         let cameras = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::camera));
         let is_seen_alike = match &cameras {
@@ -166,14 +167,21 @@ impl Document {
         };
         (&self.scene, &self.map) == (&other.scene, &other.map)
             && is_seen_alike
-            && self.changes() == other.changes()
+            && (&self.materials, &self.lamp_edits) == (&other.materials, &other.lamp_edits)
             && (light(self), things(self)) == (light(other), things(other))
     }
 
     /// What it changes of the scene's file.
     pub(super) fn changes(&self) -> SceneChanges {
-        let Self { materials, lamps, lamp_edits, .. } = self.clone();
-        SceneChanges { materials, lamps, lamp_edits }
+        let Self { materials, lamps, lamp_edits, .. } = self;
+        let (materials, lamp_edits) = (materials.clone(), lamp_edits.clone());
+        SceneChanges { materials, lamps: *lamps, lamp_edits }
+    }
+
+    /// Whether these are its changes.
+    pub(super) fn has_changes(&self, changes: &SceneChanges) -> bool {
+        let SceneChanges { materials, lamps, lamp_edits } = changes;
+        (&self.materials, &self.lamps, &self.lamp_edits) == (materials, lamps, lamp_edits)
     }
 
     /// Changes that of the scene's file, and nothing else.

@@ -29,7 +29,7 @@ pub struct LoadedScene {
     /// Its materials without them.
     pub materials: Arc<[Material]>,
     /// Its point, spot and directional lights without them.
-    pub lights: Arc<[PunctualLight]>,
+    lights: Arc<[PunctualLight]>,
     /// One of these for each name: the first.
     pub named_lamps: Arc<[PunctualLight]>,
     /// What a GPU's kernel for it holds.
@@ -52,7 +52,7 @@ impl LoadedScene {
 
     /// Whether its materials and lights are as the document wants them.
     pub(super) fn is_edited_as(&self, document: &Document) -> bool {
-        self.changes == document.changes()
+        document.has_changes(&self.changes)
     }
 
     /// The same with these changes in place of those that there are.

@@ -184,10 +184,7 @@ impl<'a> Collapse<'a> {
     /// Traversal Order for Shadow Ray Tracing*, CGF 33(6), 2014).
     fn sort_by_blocking(&self, children: &mut [u32]) {
         let half_area = |child: u32| self.binary.nodes[child as usize].aabb().half_area();
-        let is_block = |child: u32| {
-            self.weighing.choices(child).is_block()
-                && self.items.instance_of(self.binary, child).is_none()
-        };
+        let is_block = |child: u32| self.weighing.choices(child).is_block();
         children.sort_by(|&a, &b| {
             let triangles_last = is_block(a).cmp(&is_block(b));
             triangles_last.then(half_area(a).total_cmp(&half_area(b)))

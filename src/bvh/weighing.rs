@@ -45,6 +45,8 @@ pub(super) struct Choices(u64);
 impl Choices {
     /// Everything is one child.
     const OF_LEAF: Self = Self(0x1111_1110_0000_0001);
+    /// The same, and it is no block.
+    const OF_INSTANCE: Self = Self(Self::OF_LEAF.0 & !1);
 
     /// Whether the subtree is cheaper as a block than as a node where it is one child.
     pub(super) fn is_block(self) -> bool {
@@ -120,6 +122,8 @@ impl<'a> Weighing<'a> {
         let node = &self.binary.nodes[index as usize];
         let area = node.aabb().half_area();
         if self.items.instance_of(self.binary, index).is_some() {
+            let choices = Choices::OF_INSTANCE.0;
+            self.choices[index as usize].store(choices, Ordering::Relaxed);
             // Too many for a block.
             SubtreeCosts { forest: [area * INSTANCE_COST; WIDTH - 1], count: WIDTH as u32 + 1 }
         } else {

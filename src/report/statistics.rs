@@ -111,6 +111,11 @@ impl Bundle {
         Some(Self { seconds, errors })
     }
 
+    /// Indices of all runs.
+    fn runs(&self) -> Vec<usize> {
+        (0..self.errors.len()).collect()
+    }
+
     /// Mean error at every time over the runs of these indices, which may repeat.
     fn mean(&self, runs: &[usize]) -> Vec<f64> {
         let mut mean = vec![0.0; self.seconds.len()];
@@ -123,7 +128,7 @@ impl Bundle {
     /// Seconds from which on the mean error stays at or below `error`, and whether it is so at the first measured time; `None` if it
     /// is above at the end.
     pub fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
-        let mean = self.mean(&(0..self.errors.len()).collect::<Vec<_>>());
+        let mean = self.mean(&self.runs());
         let is_reached = mean.last().is_some_and(|last| *last <= error);
         is_reached.then(|| time_to(&self.seconds, &mean, error))
     }
@@ -161,8 +166,7 @@ pub struct SpeedUp {
 impl SpeedUp {
     /// The speed-up of `method` over `baseline`, both measured until the same end.
     pub fn new(baseline: &Bundle, method: &Bundle) -> Option<Self> {
-        let all = |bundle: &Bundle| (0..bundle.errors.len()).collect::<Vec<_>>();
-        let (ratio, error, is_bound) = ratio(baseline, method, &all(baseline), &all(method));
+        let (ratio, error, is_bound) = ratio(baseline, method, &baseline.runs(), &method.runs());
         let counts = [baseline.errors.len(), method.errors.len()];
         let interval = bootstrap(counts, |[a, b]| self::ratio(baseline, method, a, b).0);
         ratio.is_finite().then_some(Self { ratio, interval, error, is_bound })

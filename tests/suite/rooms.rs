@@ -132,7 +132,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11480),
+    ("app", 11495),
     ("bench", 567),
     ("bsdf", 1498),
     ("bvh", 1421),
@@ -159,11 +159,11 @@ const BUDGETS: [(&str, usize); 37] = [
     ("prefetch", 14),
     ("radiance_cache", 329),
     ("render", 6485),
-    ("report", 3081),
+    ("report", 3083),
     ("sampler", 143),
     ("scene", 9906),
     ("shaders", 6187),
-    ("sources", 127),
+    ("sources", 133),
     ("stability", 1815),
     ("system", 410),
     ("terminal", 45),

@@ -19,12 +19,21 @@ const NAME_WIDTH: f32 = 102.0;
 pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
     let Controls { document, interface, .. } = controls;
     late_factor(ui, "All", "Brightness of all lamps", &mut document.lamps);
-    let before = document.lamp_edits.clone();
+    let mut has_changed = false;
     let mut rows = |ui: &mut Ui, rows: Range<usize>| {
         for lamp in &scene.named_lamps[rows] {
-            let mut edit = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
+            let before = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
+            let mut edit = before;
             ui.push_id(&lamp.name, |ui| row(ui, lamp, &mut edit));
-            document.lamp_edits.insert(lamp.name.clone(), edit);
+            if edit == before {
+                continue;
+            }
+            has_changed = true;
+            if edit == LampEdit::default() {
+                document.lamp_edits.remove(&lamp.name);
+            } else {
+                document.lamp_edits.insert(lamp.name.clone(), edit);
+            }
         }
     };
     match scene.named_lamps.len() {
@@ -35,13 +44,13 @@ pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene
             list.show_rows(ui, height, count, rows);
         }
     }
-    document.lamp_edits.retain(|_, edit| *edit != LampEdit::default());
     let is_changed = document.lamps != 1.0 || !document.lamp_edits.is_empty();
     if is_changed && ui.button(RichText::new("Reset lamps").size(12.0)).clicked() {
         document.lamps = 1.0;
         document.lamp_edits.clear();
+        has_changed = true;
     }
-    if document.lamp_edits != before {
+    if has_changed {
         interface.keep_moving(ui.ctx());
     }
 }

@@ -58,7 +58,7 @@ pub(in crate::app) fn sections(ui: &mut Ui, controls: &mut Controls<'_>, sources
     theme::section(ui, "ENVIRONMENT");
     environment(ui, controls, sources);
     if let Some(scene) = sources.scene {
-        if !scene.lights.is_empty() {
+        if !scene.named_lamps.is_empty() {
             theme::section(ui, "LAMPS");
             lamps::show(ui, controls, scene);
         }
