@@ -1,4 +1,4 @@
-// Channels that are refracted apart: twin of src/bsdf/interface.rs and of `Hero` in src/bsdf/mod.rs.
+// Channels that are refracted apart: twin of src/bsdf/interface.rs.
 
 struct Channels {
     // The relative index of each.

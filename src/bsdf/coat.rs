@@ -5,9 +5,10 @@
 
 use glam::{Vec2, Vec3};
 
+use super::SurfaceParameters;
 use super::fresnel::{reflect, schlick_weight};
 use super::microfacet::Ggx;
-use super::{LobeSample, SurfaceParameters};
+use super::sample::LobeSample;
 use crate::math::Frame;
 
 /// F0 of index of refraction 1.5.
@@ -16,9 +17,9 @@ pub(crate) const F0: f32 = 0.04;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coat {
     strength: f32,
-    ggx: Ggx,
+    pub(super) ggx: Ggx,
     /// Around the coat's normal, in the local frame.
-    frame: Frame,
+    pub(super) frame: Frame,
     thin: bool,
     entering: bool,
 }
@@ -47,15 +48,6 @@ impl Coat {
 
     pub(super) fn is_absent(&self) -> bool {
         self.strength == 0.0
-    }
-
-    /// Unit, in the local frame.
-    pub(super) fn normal(&self) -> Vec3 {
-        self.frame.z
-    }
-
-    pub(super) fn alpha(&self) -> f32 {
-        self.ggx.alpha()
     }
 
     pub(super) fn is_delta_or_absent(&self) -> bool {

@@ -10,10 +10,11 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
+use super::SurfaceParameters;
 use super::albedo::AlbedoTerms;
 use super::interface::Interface;
-use super::{SurfaceParameters, cosine_hemisphere};
 use crate::color::importance;
+use crate::math::sin_cos_turns;
 
 /// The body under the opaque dielectric's share of the interface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +28,8 @@ pub(super) struct Diffuse {
     through: f32,
     /// The dielectric's largest F0 and its F90.
     f0_f90: Vec2,
-    terms: AlbedoTerms,
+    /// The interface's.
+    pub(super) terms: AlbedoTerms,
 }
 
 impl Diffuse {
@@ -63,11 +65,6 @@ impl Diffuse {
 
     pub(super) fn is_absent(&self) -> bool {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
-    }
-
-    /// The interface's albedo terms towards `v`.
-    pub(super) fn terms_at(&self, v: Vec3) -> Vec2 {
-        self.terms.at(v)
     }
 
     /// What the interface leaves towards `v`, on either side.
@@ -121,4 +118,11 @@ impl Diffuse {
     fn let_in(&self) -> f32 {
         1.0 - self.f0_f90.dot(self.terms.mean())
     }
+}
+
+/// A direction around +Z with density `cos / pi`.
+pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let (sin_phi, cos_phi) = sin_cos_turns(u.x);
+    let r = u.y.sqrt();
+    Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())
 }

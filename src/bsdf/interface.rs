@@ -7,14 +7,45 @@
 
 use glam::{Vec2, Vec3};
 
+use super::SurfaceParameters;
 use super::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
 use super::iridescence::Film;
 use super::microfacet::Ggx;
-use super::{Hero, LobeSample, SurfaceParameters};
+use super::sample::LobeSample;
 use crate::color::importance;
 
 /// Relative indices closer to 1 than this refract straight on: f32 half vectors vanish.
 pub(crate) const STRAIGHT_ETA: f32 = 1e-3;
+
+/// The channel whose index of refraction decides where a dispersive solid sends a path.
+///
+/// What is refracted carries that channel alone, over the probability of having chosen it; what is
+/// reflected carries all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hero {
+    /// 0 to 2: red, green, blue.
+    pub channel: usize,
+    /// Probability of having chosen it, above 0.
+    pub probability: f32,
+}
+
+impl Hero {
+    /// Chooses among what a path carries, in proportion, by a uniform number. A path of one channel
+    /// keeps it.
+    pub fn choose(throughput: Vec3, u: f32) -> Self {
+        let share = throughput / throughput.max_element();
+        let share = share / share.element_sum();
+        let [red, green] = [u < share.x, u < share.x + share.y];
+        let channel = if red || (share.y == 0.0 && share.z == 0.0) {
+            0
+        } else if green || share.z == 0.0 {
+            1
+        } else {
+            2
+        };
+        Self { channel, probability: share[channel] }
+    }
+}
 
 /// Reflection and transmission at one microfacet.
 #[derive(Debug, Clone, Copy)]
@@ -24,8 +55,6 @@ struct Facet {
 }
 
 impl Facet {
-    const BLACK: Self = Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO };
-
     /// Probability of reflecting there.
     fn reflection_probability(self) -> f32 {
         let (r, t) = (importance(self.reflectance), importance(self.transmittance));
@@ -35,7 +64,8 @@ impl Facet {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interface {
-    ggx: Ggx,
+    /// The microfacets.
+    pub(super) ggx: Ggx,
     /// Opaque share: metal and dielectric, weights included.
     f0: Vec3,
     f90: f32,
@@ -143,16 +173,12 @@ impl Interface {
     pub(super) fn is_delta_or_absent(&self) -> bool {
         let reflects_nothing =
             self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.glass_f0 == Vec3::ZERO;
-        self.is_smooth() || self.is_absent() || (self.transmits_delta() && reflects_nothing)
-    }
-
-    fn is_smooth(&self) -> bool {
-        self.ggx.is_smooth()
+        self.ggx.is_smooth() || self.is_absent() || (self.transmits_delta() && reflects_nothing)
     }
 
     /// Whether there is metal that is no mirror, or what an infinite index makes one (specular-glossiness).
     pub(super) fn is_rough_metal(&self, p: &SurfaceParameters) -> bool {
-        (p.metallic > 0.0 || p.ior == 0.0) && !self.is_smooth()
+        (p.metallic > 0.0 || p.ior == 0.0) && !self.ggx.is_smooth()
     }
 
     /// The glass, if it is spread on its way through.
@@ -162,11 +188,6 @@ impl Interface {
             eta: self.eta,
             normal: self.glass_at(1.0, self.eta),
         })
-    }
-
-    /// The microfacets.
-    pub(super) fn ggx(&self) -> Ggx {
-        self.ggx
     }
 
     /// Reflectance and transmittance of a facet seen at this cosine.
@@ -226,12 +247,12 @@ impl Interface {
 
     /// Smooth thin walls: the integrator passes through them.
     fn passes_straight(&self) -> bool {
-        self.glass > 0.0 && self.thin && self.is_smooth()
+        self.glass > 0.0 && self.thin && self.ggx.is_smooth()
     }
 
     /// Transmission without a lobe though the reflection may have one.
     fn transmits_delta(&self) -> bool {
-        self.is_smooth() || (!self.thin && self.eta == 1.0)
+        self.ggx.is_smooth() || (!self.thin && self.eta == 1.0)
     }
 
     /// The facet as far as `eval` and `sample` answer for it.
@@ -253,7 +274,7 @@ impl Interface {
 
     /// A direction from two uniform numbers and one that chooses between reflection and transmission.
     pub(super) fn sample(&self, wo: Vec3, choice: f32, u: Vec2) -> Option<LobeSample> {
-        let smooth = self.is_smooth();
+        let smooth = self.ggx.is_smooth();
         let h = if smooth { Vec3::Z } else { self.ggx.sample_visible_normal(wo, u) };
         let facet = self.scattering_facet(wo.dot(h));
         let probability = self.reflection_probability(facet, wo);
@@ -292,7 +313,7 @@ impl Interface {
 
     /// `f * |cos wi|` of the lobes, and the density of [`Self::sample`] choosing `wi` from them.
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
-        if self.is_smooth() {
+        if self.ggx.is_smooth() {
             return (Vec3::ZERO, 0.0);
         }
         if wi.z > 0.0 {
@@ -344,17 +365,16 @@ impl Interface {
 
     /// Estimate of all that [`Self::sample`] carries, given the albedo terms at `wo`.
     pub(super) fn albedo(&self, cos: f32, terms: Vec2) -> Vec3 {
-        let passing = if self.glass > 0.0 {
-            let under_film = self.under_film.map(|(f0, _)| (f0, 0.0));
-            Self { f0: Vec3::ZERO, f90: 0.0, under_film, ..*self }.scattering_facet(cos)
-        } else {
-            Facet::BLACK
-        };
         let opaque = if self.film.is_absent() {
             self.f0 * terms.x + self.f90 * terms.y
         } else {
             self.opaque(cos) * (terms.x + terms.y)
         };
+        if self.glass == 0.0 {
+            return opaque;
+        }
+        let under_film = self.under_film.map(|(f0, _)| (f0, 0.0));
+        let passing = Self { f0: Vec3::ZERO, f90: 0.0, under_film, ..*self }.scattering_facet(cos);
         opaque + passing.reflectance + passing.transmittance
     }
 }

@@ -25,67 +25,25 @@ pub(crate) mod iridescence;
 pub(crate) mod lobes;
 pub(crate) mod microfacet;
 pub(crate) mod rescatter;
+mod sample;
 pub(crate) mod sheen;
 
 use glam::{Vec2, Vec3};
 
 use crate::color::importance;
-use crate::math::sin_cos_turns;
 pub use crate::scene::surface::SurfaceParameters;
 use albedo::AlbedoTerms;
 use coat::Coat;
 use diffuse::Diffuse;
+pub(crate) use diffuse::cosine_hemisphere;
 use fresnel::normal_reflectance;
+pub use interface::Hero;
 use interface::Interface;
 use lobes::{LobeWeights, MAX_NARROW_SHARE};
 use rescatter::Rescatter;
+pub use sample::BsdfSample;
+use sample::LobeSample;
 use sheen::Sheen;
-
-/// A direction drawn by [`Bsdf::sample`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BsdfSample {
-    /// Unit direction the light comes from, local.
-    pub wi: Vec3,
-    /// `f * |cos wi| / pdf`; through a solid's surface radiance scales by the squared relative index
-    /// of refraction, so this may exceed 1 on the way out and is below it on the way in.
-    pub weight: Vec3,
-    /// Density per steradian, as [`Bsdf::pdf_solid_angle`]; 1 and meaningless if `is_delta`.
-    pub pdf_solid_angle: f32,
-    /// A perfect reflection or refraction, which no other technique can find.
-    pub is_delta: bool,
-    /// Whether `wi` is on the far side.
-    pub is_transmission: bool,
-}
-
-/// The channel whose index of refraction decides where a dispersive solid sends a path.
-///
-/// What is refracted carries that channel alone, over the probability of having chosen it; what is
-/// reflected carries all of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hero {
-    /// 0 to 2: red, green, blue.
-    pub channel: usize,
-    /// Probability of having chosen it, above 0.
-    pub probability: f32,
-}
-
-impl Hero {
-    /// Chooses among what a path carries, in proportion, by a uniform number. A path of one channel
-    /// keeps it.
-    pub fn choose(throughput: Vec3, u: f32) -> Self {
-        let share = throughput / throughput.max_element();
-        let share = share / share.element_sum();
-        let [red, green] = [u < share.x, u < share.x + share.y];
-        let channel = if red || (share.y == 0.0 && share.z == 0.0) {
-            0
-        } else if green || share.z == 0.0 {
-            1
-        } else {
-            2
-        };
-        Self { channel, probability: share[channel] }
-    }
-}
 
 /// The scattering at one point, for one side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +71,7 @@ pub(crate) struct ViewedBsdf<'a> {
 
 /// What depends on `wo` alone: what the interface leaves for the body, and the probability of each
 /// lobe, in proportion to its albedo.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Outgoing {
     diffuse_left: f32,
     /// What the interface's single scattering loses.
@@ -134,7 +92,7 @@ impl Bsdf {
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
         let interface = Interface::new(p, f0, f90, entering);
         let f0_f90 = Vec2::new(interface.largest_f0(p, f0), f90);
-        let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
+        let terms = AlbedoTerms::of(interface.ggx, p.roughness);
         let diffuse = Diffuse::new(p, f0_f90, terms, &interface);
         let rescatter = Rescatter::new(p, terms, &interface);
         let (sheen, coat) = (Sheen::new(p, entering), Coat::new(p, entering));
@@ -191,10 +149,8 @@ impl Bsdf {
     fn narrow_lobes(&self, min_alpha: f32) -> [bool; 2] {
         let Self { coat, interface, weights, .. } = self;
         [
-            weights.coat > 0.0 && !coat.is_absent() && coat.alpha() < min_alpha,
-            weights.interface > 0.0
-                && !interface.is_absent()
-                && interface.ggx().alpha() < min_alpha,
+            weights.coat > 0.0 && !coat.is_absent() && coat.ggx.alpha() < min_alpha,
+            weights.interface > 0.0 && !interface.is_absent() && interface.ggx.alpha() < min_alpha,
         ]
     }
 
@@ -242,7 +198,7 @@ impl Bsdf {
 
     /// The coat's local normal, if there is a coat.
     pub(crate) fn coat_normal(&self) -> Option<Vec3> {
-        (!self.coat.is_absent()).then(|| self.coat.normal())
+        (!self.coat.is_absent()).then(|| self.coat.frame.z)
     }
 
     /// Whether next event estimation can find light: not for a part that only reflects perfectly.
@@ -277,7 +233,7 @@ impl Bsdf {
     /// part; an estimate for guide layers of denoisers.
     pub fn albedo(&self) -> Vec3 {
         let up = Vec3::Z;
-        let terms = self.diffuse.terms_at(up);
+        let terms = self.diffuse.terms.at(up);
         let scale = self.interface.radiance_scale();
         let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms), scale);
         let interface =
@@ -347,16 +303,13 @@ impl Bsdf {
             if !(diffuse && interface) {
                 return (diffuse || interface).then(|| Outgoing {
                     diffuse_left: 1.0,
-                    lost: 0.0,
-                    coat_probability: 0.0,
                     interface_probability: f32::from(interface),
-                    sheen_probability: 0.0,
-                    rescatter_probability: 0.0,
                     diffuse_probability: f32::from(diffuse),
+                    ..Outgoing::default()
                 });
             }
         }
-        let terms = self.diffuse.terms_at(wo);
+        let terms = self.diffuse.terms.at(wo);
         let diffuse_left = self.diffuse.left_of(terms);
         let under = self.coat.attenuation(wo);
         let base = under * self.sheen.left(wo, wo);
@@ -424,7 +377,7 @@ impl<'a> ViewedBsdf<'a> {
         let direction = Vec2::new(u.y, u.z);
         if bsdf.is_lambert {
             let wi = cosine_hemisphere(direction);
-            return spread_sample(wi, self.eval_pdf(wi));
+            return BsdfSample::spread(wi, self.eval_pdf(wi));
         }
         let out = out?;
         let choice = u.x - out.coat_probability;
@@ -451,11 +404,11 @@ impl<'a> ViewedBsdf<'a> {
             }
         };
         match lobe {
-            LobeSample::Spread(wi) => spread_sample(wi, bsdf.eval_pdf_with(wo, wi, &out)),
-            LobeSample::Coat(wi, weight) => delta_sample(wi, weight * bsdf.weights.max()),
+            LobeSample::Spread(wi) => BsdfSample::spread(wi, bsdf.eval_pdf_with(wo, wi, &out)),
+            LobeSample::Coat(wi, weight) => BsdfSample::delta(wi, weight * bsdf.weights.max()),
             LobeSample::Interface(wi, weight) => {
                 let left = bsdf.weights.max() * bsdf.left_by_layers(wo, wi);
-                delta_sample(wi, weight * (left / out.interface_probability))
+                BsdfSample::delta(wi, weight * (left / out.interface_probability))
             }
         }
     }
@@ -464,47 +417,6 @@ impl<'a> ViewedBsdf<'a> {
 /// Share of what is under a surface's coat that passes it towards a unit local `wo`, in `[0,1]`.
 pub(crate) fn left_by_coat(p: &SurfaceParameters, entering: bool, wo: Vec3) -> f32 {
     Coat::new(p, entering).attenuation(wo)
-}
-
-/// What sampling one lobe found.
-#[derive(Debug, Clone, Copy)]
-enum LobeSample {
-    /// A direction with a density, to be evaluated with all lobes.
-    Spread(Vec3),
-    /// Perfect reflection of the coat: direction and weight.
-    Coat(Vec3, Vec3),
-    /// Perfect reflection or refraction of the interface: direction and `f * |cos|` over the
-    /// probability of having chosen it within the interface.
-    Interface(Vec3, Vec3),
-}
-
-/// A direction, given the scattering and the density there.
-fn spread_sample(wi: Vec3, (value, pdf_solid_angle): (Vec3, f32)) -> Option<BsdfSample> {
-    let weight = value / pdf_solid_angle;
-    (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(BsdfSample {
-        wi,
-        weight,
-        pdf_solid_angle,
-        is_delta: false,
-        is_transmission: wi.z < 0.0,
-    })
-}
-
-fn delta_sample(wi: Vec3, weight: Vec3) -> Option<BsdfSample> {
-    (weight.is_finite() && weight != Vec3::ZERO).then_some(BsdfSample {
-        wi,
-        weight,
-        pdf_solid_angle: 1.0,
-        is_delta: true,
-        is_transmission: wi.z < 0.0,
-    })
-}
-
-/// A direction around +Z with density `cos / pi`.
-pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    let (sin_phi, cos_phi) = sin_cos_turns(u.x);
-    let r = u.y.sqrt();
-    Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())
 }
 
 #[cfg(test)]

@@ -13,11 +13,12 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::SurfaceParameters;
 use super::albedo::AlbedoTerms;
+use super::diffuse::cosine_hemisphere;
 use super::fresnel::{dielectric, reflect, refract};
 use super::interface::Interface;
 use super::microfacet::Ggx;
-use super::{SurfaceParameters, cosine_hemisphere};
 use crate::color::importance;
 
 /// Nodes of the table of solid glass in the square root of the cosine, and in the roughness.
@@ -93,7 +94,7 @@ impl Rescatter {
                 glass.normal
             } else {
                 let eta = glass.eta;
-                let sides = [eta, 1.0 / eta].map(|eta| Albedo::Refracts(interface.ggx(), eta));
+                let sides = [eta, 1.0 / eta].map(|eta| Albedo::Refracts(interface.ggx, eta));
                 [near, far] = sides.map(Loss::of);
                 let [a, b] = [1.0 / near.inverse_mean, eta * eta / far.inverse_mean];
                 let share = p.specular / (a + b);
