@@ -1,5 +1,5 @@
 // A world-space cache of reflected radiance: twin of src/radiance_cache/cells.rs, of what reads the cache
-// in src/radiance_cache/mod.rs, and of src/path/cached.rs.
+// in src/radiance_cache/look_up.rs, and of src/path/cached.rs.
 
 struct CacheCell {
     coordinates: vec3i,

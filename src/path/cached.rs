@@ -40,7 +40,7 @@ impl Path<'_> {
     /// Whether the cache, if there is one, knows what the path would find from a surface that it has arrived at.
     pub(super) fn is_known(&self, position: Vec3, normal: Vec3) -> bool {
         let is_wide =
-            |cache: &RadianceCache| spread_at(self, normal) >= cache.cells().edge_at(position);
+            |cache: &RadianceCache| spread_at(self, normal) >= cache.cells.edge_at(position);
         self.is_in_air() && self.tracer.cache.is_none_or(is_wide)
     }
 

@@ -2,10 +2,14 @@
 
 use glam::Vec3;
 
-use super::{MAX_PROBES, SLOTS};
 use crate::light_grid::cells::dominant_face;
 use crate::sampler::hash;
 
+/// Slots of the table: a power of two.
+pub(crate) const SLOTS: usize = 1 << 16;
+/// Maximum number of successive slots that are probed for a cell. No cell needs more before the table counts as
+/// full, so that the order of insertion does not decide which cells find a slot.
+pub(crate) const MAX_PROBES: usize = 512;
 /// Maximum number of doublings of a cell's edge.
 const MAX_LEVELS: u32 = 31;
 /// Flag of parents: cells four times as large, which cells with few paths are blended with.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::cells::Cell;
-use super::{RadianceCache, SLOTS, WORDS};
+use super::look_up::RadianceCache;
 
 /// The cache, and the training of its cells.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ pub struct KnownCell {
 impl CacheFacts {
     /// The cell of a surface with this unit normal on the side it is seen from.
     pub fn cell_at(&self, position: Vec3, normal: Vec3) -> KnownCell {
-        let cells = self.cache.cells();
+        let cells = &self.cache.cells;
         let cell = cells.cell_at(position, normal);
         let [own, around] = [cell, cell.parent()].map(|cell| self.training_of(cell));
         let albedo = if own.paths > 0 { own.albedo } else { around.albedo };
@@ -60,11 +60,6 @@ impl CacheFacts {
             samples_around: around.paths,
             radiance: albedo * self.cache.radiance_over_albedo(position, normal),
         }
-    }
-
-    /// Bytes of the cache and its training, without these facts.
-    pub fn memory_bytes() -> usize {
-        SLOTS * (WORDS * size_of::<u32>() + size_of::<[u32; 4]>())
     }
 
     fn training_of(&self, cell: Cell) -> Training {

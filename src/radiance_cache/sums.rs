@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use glam::{DVec3, Vec3};
 
-use super::cells::{CacheCells, Key};
+use super::cells::{CacheCells, Key, SLOTS};
 use super::facts::{CacheFacts, Training};
-use super::{MIN_ALBEDO, PARENTS_PATHS, PATHS_OF_ALL, RadianceCache, SLOTS};
+use super::look_up::RadianceCache;
 use crate::sampler::{hash, unit_from_bits};
 
 /// Words of a slot: check word, slot of the parent plus one, number of paths, albedo (three), radiance
@@ -22,6 +22,12 @@ pub(crate) const ALBEDO_ONE: f32 = 255.0;
 /// words.
 const BRIGHTEST: f32 = (1_u64 << 36) as f32;
 const MAX_SUM: f32 = (1_u64 << 40) as f32;
+/// Weight of the parent's mean in a cell, in paths.
+const PARENTS_PATHS: f64 = 8.0;
+/// Weight of the mean of all cells in a parent, in paths: few paths are often much brighter or darker.
+const PATHS_OF_ALL: f64 = 1.0;
+/// Minimum albedo that radiance is divided by.
+const MIN_ALBEDO: f64 = 1.0 / 256.0;
 /// Share of used slots above which a cell may find no slot.
 const FULL: f64 = 0.75;
 /// Maximum number of paths that train the cache.
@@ -54,6 +60,11 @@ impl RadianceSums {
         let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
         let words = (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect();
         Self { cells, scale, words, used: AtomicUsize::new(0) }
+    }
+
+    /// Bytes of the sums and of the cache that is made of them.
+    pub fn memory_bytes() -> usize {
+        SLOTS * (WORDS * size_of::<u32>() + size_of::<[u32; 4]>())
     }
 
     /// All words and the units of a radiance of 1: the state from which a GPU continues.

@@ -223,7 +223,7 @@ pub(super) mod tests {
             training.advance(range.end);
             assert!(places < 1_000_000, "it comes to an end");
         }
-        let cells = training.cache().expect("it was trained").cells();
+        let cells = training.cache().expect("it was trained").cells;
         assert!(cells.edge > edge / 64.0, "{} for {edge}", cells.edge);
     }
 }

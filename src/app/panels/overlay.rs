@@ -8,7 +8,7 @@ use crate::app::overlays::{Legend, Overlay, palette};
 use crate::app::presenter::Shown;
 use crate::app::theme;
 use crate::app::worker::NoCache;
-use crate::radiance_cache::CacheFacts;
+use crate::radiance_cache::{CacheFacts, RadianceSums};
 
 /// Draws the choice and the legend.
 pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option<&Shown>) {
@@ -63,7 +63,7 @@ pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
 /// How large the cache is.
 pub(in crate::app) fn cache_size(cache: &CacheFacts) -> String {
     let [cells, samples] = [cache.cell_count as u64, cache.samples].map(theme::count);
-    let memory = theme::bytes(CacheFacts::memory_bytes()).replace(' ', "\u{a0}");
+    let memory = theme::bytes(RadianceSums::memory_bytes()).replace(' ', "\u{a0}");
     format!("{cells} cells of {samples} samples, {memory}")
 }
 

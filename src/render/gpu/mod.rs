@@ -234,7 +234,7 @@ impl Renderer {
         on.globals.cache_is_known = u32::from(cache.is_some());
         on.globals.cache_mean = cache.map_or(Vec3::ZERO, |cache| cache.mean);
         if let Some(cache) = cache {
-            on.globals.set_cells_of_cache(cache.cells(), on.globals.cache_scale);
+            on.globals.set_cells_of_cache(&cache.cells, on.globals.cache_scale);
         }
         let slots = cache.map_or(&[][..], |cache| &cache.slots);
         let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };

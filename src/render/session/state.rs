@@ -7,7 +7,7 @@ use super::noise::Noise;
 use crate::light_grid::LearningGrid;
 use crate::path::{Lit, PathTracer};
 #[cfg(feature = "window")]
-use crate::radiance_cache::CacheFacts;
+use crate::radiance_cache::RadianceSums;
 use crate::render::film::Film;
 use crate::render::gi::CacheTraining;
 use crate::render::{Figures, View};
@@ -90,7 +90,7 @@ impl SessionState {
 
     /// Bytes of film, distributions, counters and radiance cache.
     pub(crate) fn memory_bytes(&self) -> usize {
-        let cache = self.training.as_ref().map_or(0, |_| CacheFacts::memory_bytes());
+        let cache = self.training.as_ref().map_or(0, |_| RadianceSums::memory_bytes());
         self.film().map_or(0, Film::memory_bytes) + self.tiles.memory_bytes() + cache
     }
 }
