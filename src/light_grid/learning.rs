@@ -3,8 +3,8 @@
 use super::cells::SphericalGrid;
 use super::counters::Counters;
 use super::distribution_builder::DistributionBuilder;
+use super::grid::{Cells, LightGrid, WHOLE_MAP};
 use super::options::{DistributionOptions, Recording};
-use super::{Cells, LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::environment::Environment;
 
 /// A grid with its learning counters: records while paths are traced, then becomes a [`LightGrid`].
@@ -18,6 +18,9 @@ pub struct LearningGrid {
     /// Number of times that distributions were built.
     generation: u32,
 }
+
+/// Maximum bytes of the grid, in learning and in rendering (the talk's 10 MB).
+pub const MEMORY_BUDGET_BYTES: usize = 10 << 20;
 
 /// Share of the budget for the counters; distributions take the rest while both are held.
 const COUNTER_SHARE: f64 = 0.65;

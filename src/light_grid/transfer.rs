@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{LightGrid, WHOLE_MAP};
+use super::grid::{LightGrid, WHOLE_MAP};
 use crate::environment::Environment;
 
 /// Places along a tile's width that are asked for what was known there.

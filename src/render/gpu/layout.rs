@@ -286,9 +286,9 @@ pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32>
     globals.distribution_tiles_at = push(&mut pairs(&distributions.tiles));
     globals.distribution_last_at = push(&mut distributions.last.iter().copied());
     globals.distribution_of_cell_at = NO_ARRAY;
-    if let Some((cells, distribution_of_cell)) = grid.cells() {
-        globals.distribution_of_cell_at = push(&mut pairs(distribution_of_cell));
-        globals.set_cells(cells);
+    if let Some(cells) = &grid.cells {
+        globals.distribution_of_cell_at = push(&mut pairs(&cells.distribution_of_cell));
+        globals.set_cells(&cells.grid);
     }
     globals.whole_map_share = grid.whole_map_share;
     globals.words_per_distribution = distributions.words_per_distribution;
