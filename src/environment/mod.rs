@@ -13,6 +13,7 @@ mod options;
 mod patches;
 mod sat_report;
 pub mod sky;
+mod statistics;
 mod summed_area;
 pub mod sun;
 mod table;
@@ -30,11 +31,12 @@ use rayon::prelude::*;
 pub use self::options::{EnvironmentOptions, TableKind};
 use self::patches::{PatchRows, sample_linear};
 pub use self::sat_report::{SatReport, SatReportRow, TALKS_MAPS, TIMED_SAMPLES, sat_report};
+use self::statistics::{Statistics, check_size};
 use self::table::{Search, Table};
 use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::color::importance;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::huge_pages::zeros_on_huge_pages;
 use crate::image::Image;
 use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
@@ -47,7 +49,7 @@ pub struct Environment {
     map: Arc<Image>,
     grid: TileGrid,
     table: Arc<Table>,
-    table_kind: TableKind,
+    pub(crate) table_kind: TableKind,
     tile_energies: Vec<f64>,
     pub(crate) patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
@@ -57,10 +59,8 @@ pub struct Environment {
     importances: Arc<Vec<f32>>,
     /// One over each tile's energy in the same scale; 0 where f32 overflows.
     pub(crate) inverse_energies: Vec<f32>,
-    /// Solid-angle mean of the map, without intensity.
-    map_mean: Vec3,
-    map_is_black: bool,
-    map_is_constant: bool,
+    /// Of the pixels, without intensity.
+    statistics: Statistics,
     /// Rotation in turns, in `[0,1)`.
     rotation_turns: f32,
     intensity: f32,
@@ -127,13 +127,11 @@ impl Environment {
         importances.par_iter_mut().zip(&map.pixels).for_each(|(scaled, rgb)| {
             *scaled = importance(Vec3::from(*rgb) * importance_scale);
         });
-        let inverse = |energy: &f64| (1.0 / (energy * f64::from(importance_scale))) as f32;
-        let inverse_energies = tile_energies
-            .iter()
-            .map(|energy| {
-                Some(inverse(energy)).filter(|inverse| inverse.is_finite()).unwrap_or(0.0)
-            })
-            .collect();
+        let inverse = |energy: &f64| {
+            let inverse = (1.0 / (energy * f64::from(importance_scale))) as f32;
+            if inverse.is_finite() { inverse } else { 0.0 }
+        };
+        let inverse_energies = tile_energies.iter().map(inverse).collect();
         let mut environment = Self {
             patches: PatchRows::new(map.width, map.height),
             map: Arc::new(map),
@@ -144,9 +142,7 @@ impl Environment {
             importance_scale,
             importances: Arc::new(importances),
             inverse_energies,
-            map_mean: statistics.mean,
-            map_is_black: statistics.black,
-            map_is_constant: statistics.constant,
+            statistics,
             rotation_turns: 0.0,
             intensity: options.intensity,
         };
@@ -305,17 +301,17 @@ impl Environment {
 
     /// Whether the map is black.
     pub fn is_black(&self) -> bool {
-        self.intensity <= 0.0 || self.map_is_black
+        self.intensity <= 0.0 || self.statistics.black
     }
 
     /// Whether all pixels are the same.
     pub fn is_constant(&self) -> bool {
-        self.map_is_constant
+        self.statistics.constant
     }
 
     /// Mean radiance over the sphere.
     pub fn mean_radiance(&self) -> Vec3 {
-        (self.map_mean * self.intensity).min(Vec3::MAX)
+        (self.statistics.mean * self.intensity).min(Vec3::MAX)
     }
 
     /// The map with its sun factor applied, not rotated, at intensity 1.
@@ -326,11 +322,6 @@ impl Environment {
     /// The table's sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
     pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
         self.table.tile_sums()
-    }
-
-    /// Which table.
-    pub(crate) fn table_kind(&self) -> TableKind {
-        self.table_kind
     }
 
     /// Rotation in turns, in `[0,1)`, and the factor on all radiance.
@@ -458,69 +449,4 @@ pub(crate) fn refine([x, y]: [u32; 2]) -> [u64; 2] {
     let fine_x = hash(hash(x) ^ y);
     let fine_y = hash(fine_x ^ x);
     [(x, fine_x), (y, fine_y)].map(|(coarse, fine)| u64::from(coarse) << 32 | u64::from(fine))
-}
-
-fn check_size(map: &Image) -> Result<()> {
-    let pixels = map.width as usize * map.height as usize;
-    if pixels == 0 || pixels != map.pixels.len() || pixels > 1 << 31 {
-        return Err(Error::new(format!(
-            "an environment map of {} x {} with {} pixels cannot be used",
-            map.width,
-            map.height,
-            map.pixels.len()
-        )));
-    }
-    Ok(())
-}
-
-/// What one pass over the pixels tells.
-struct Statistics {
-    mean: Vec3,
-    largest: f32,
-    black: bool,
-    constant: bool,
-}
-
-/// The same of one row.
-struct RowStatistics {
-    sum: glam::DVec3,
-    largest: f32,
-    constant: bool,
-    valid: bool,
-}
-
-impl Statistics {
-    fn of(map: &Image) -> Result<Self> {
-        let first = map.pixels[0];
-        let solid_angle = |row| patches::solid_angle(map.width, map.height, row);
-        // Each row of patches lends half of itself to the row of texels above and below it.
-        let share = |is_pole: bool, row| if is_pole { 1.0 } else { 0.5 } * solid_angle(row);
-        let row_weight = |y: u32| share(y == 0, y) + share(y + 1 == map.height, y + 1);
-        let rows: Vec<RowStatistics> = map
-            .pixels
-            .par_chunks_exact(map.width as usize)
-            .zip(0..map.height)
-            .map(|(row, y)| {
-                let sum: glam::DVec3 = row.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
-                let values = row.as_flattened();
-                RowStatistics {
-                    sum: sum * row_weight(y),
-                    largest: values.iter().copied().fold(0.0, f32::max),
-                    constant: row.iter().all(|pixel| *pixel == first),
-                    valid: values.iter().all(|value| (0.0..=f32::MAX).contains(value)),
-                }
-            })
-            .collect();
-        if !rows.iter().all(|row| row.valid) {
-            return Err(Error::new(
-                "the environment map has radiance that is negative or not finite",
-            ));
-        }
-        let sum: glam::DVec3 = rows.iter().map(|row| row.sum).sum();
-        let constant = rows.iter().all(|row| row.constant);
-        let mean = if constant { Vec3::from(first) } else { (sum / (2.0 * TAU)).as_vec3() };
-        let largest = rows.iter().map(|row| row.largest).fold(0.0, f32::max);
-        // Decided in f64: the mean of one dim texel may be nothing in f32.
-        Ok(Self { mean, largest, black: sum.max_element() <= 0.0, constant })
-    }
 }

@@ -12,12 +12,13 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::options::{EnvironmentOptions, TableKind};
+use super::statistics::check_size;
 use super::summed_area::SummedArea;
 use super::table::Table;
 use super::tile_local::TileLocal;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
-use super::{EnvironmentOptions, TableKind, check_size};
 use crate::error::Result;
 use crate::image::Image;
 

@@ -170,7 +170,7 @@ impl UploadedScene {
         });
         buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
         let parts = environment.tile_sums().ok_or_else(|| {
-            let kind = environment.table_kind();
+            let kind = environment.table_kind;
             Error::new(format!("a summed-area table ({kind}) is for the CPU alone"))
         })?;
         globals.tile_sums_at = parts[0].len() as u32;
