@@ -66,19 +66,13 @@ impl Blit {
     pub(super) fn source(&self, gpu: &Gpu, display: &DisplayTexture) -> Source {
         let layout = self.pipeline.get_bind_group_layout(0);
         let pictures = self.samplers.each_ref().map(|sampler| {
+            let view = wgpu::BindingResource::TextureView(&display.view);
+            let entries = [(0, view), (1, wgpu::BindingResource::Sampler(sampler))]
+                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("blit"),
                 layout: &layout,
-                entries: &[
-                    wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: wgpu::BindingResource::TextureView(display.view()),
-                    },
-                    wgpu::BindGroupEntry {
-                        binding: 1,
-                        resource: wgpu::BindingResource::Sampler(sampler),
-                    },
-                ],
+                entries: &entries,
             })
         });
         Source { pipeline: self.pipeline.clone(), pictures }
@@ -165,8 +159,8 @@ mod tests {
     use wgpu::TextureFormat;
 
     use super::*;
-    use crate::develop::DevelopSettings;
     use crate::develop::tests::developer;
+    use crate::develop::{DevelopSettings, LinearPicture};
     use crate::image::{Image, Rgb8};
     use crate::render::gpu::texture;
     use crate::tone::{ToneCurve, WhiteBalance};
@@ -208,16 +202,16 @@ mod tests {
     #[test]
     fn a_picture_is_drawn_pixel_for_pixel_however_frames_are_encoded() {
         let Some(developer) = developer() else { return };
-        let gpu = developer.gpu();
+        let gpu = &developer.gpu;
         let pixels = (0..16 * 8).map(|i| [i as f32 / 127.0, (i % 16) as f32 / 15.0, 0.3]).collect();
-        let picture = developer.upload_image(&Image { width: 16, height: 8, pixels });
+        let picture = LinearPicture::of_image(gpu, &Image { width: 16, height: 8, pixels });
         let settings = DevelopSettings {
             white_balance: WhiteBalance::default(),
             exposure_ev: 0.0,
             curve: ToneCurve::None,
             opacity: [0.0; 2],
         };
-        let display = developer.display_texture([16, 8]);
+        let display = DisplayTexture::new(gpu, [16, 8]);
         developer.develop(&picture, None, &settings, &display);
         let levels = developer.read(&display).expect("read");
         for format in [TextureFormat::Rgba8Unorm, TextureFormat::Rgba8UnormSrgb] {

@@ -106,14 +106,14 @@ impl Comparison {
             };
             match found {
                 Ok((image, difference)) => {
-                    let picture = Some(developer.upload_image(&image));
+                    let picture = Some(LinearPicture::of_image(&developer.gpu, &image));
                     return Compared { picture, difference, ..compared };
                 }
                 Err(sentence) => compared.failure = Some(sentence),
             }
         }
-        compared.picture = right.map(|image| developer.upload_image(&image));
-        compared.other = Some(developer.upload_image(&left));
+        compared.picture = right.map(|image| LinearPicture::of_image(&developer.gpu, &image));
+        compared.other = Some(LinearPicture::of_image(&developer.gpu, &left));
         compared
     }
 }

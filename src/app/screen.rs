@@ -35,7 +35,7 @@ impl Screen {
 
     /// The device.
     pub(super) fn gpu(&self) -> &Gpu {
-        self.developer.gpu()
+        &self.developer.gpu
     }
 }
 
@@ -101,7 +101,7 @@ impl Developed {
             }
             return old.source.clone();
         }
-        let display = developer.display_texture(size);
+        let display = DisplayTexture::new(&developer.gpu, size);
         develop(&display, &recipe);
         let source = screen.blit.source(screen.gpu(), &display);
         *slot = Some(Self { display, source: source.clone(), recipe });

@@ -1,6 +1,6 @@
 //! The à-trous filter of [`crate::denoise`] as compute passes.
 
-use super::{dispatch, entry, filled, pipeline};
+use super::passes::{dispatch, entry, filled, pipelines};
 use crate::denoise::a_trous::STEPS;
 use crate::denoise::{a_trous, edges, guides, light};
 use crate::render::gpu::{DeviceFilm, Gpu, buffer, constants};
@@ -46,13 +46,8 @@ pub(super) struct Passes([wgpu::ComputePipeline; NAMES.len()]);
 
 impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Self {
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("a-trous"),
-            source: wgpu::ShaderSource::Wgsl(
-                (shared() + include_str!("../../shaders/a_trous.wgsl")).into(),
-            ),
-        });
-        Self(NAMES.map(|name| pipeline(gpu, &shader, name)))
+        let source = (shared() + include_str!("../../shaders/a_trous.wgsl")).into();
+        Self(pipelines(gpu, "a-trous", source, NAMES))
     }
 
     /// Whether the guides of so many pixels fit into one binding.
@@ -85,7 +80,7 @@ impl Passes {
         let [guides, mut light, mut result, counts] = made.ok()?;
         let settings = |step: u32| {
             let words = [film.width, film.height, step, film.scale.recip().to_bits()];
-            filled(gpu, wgpu::BufferUsages::UNIFORM, bytemuck::cast_slice(&words))
+            filled(gpu, wgpu::BufferUsages::UNIFORM, &words)
         };
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         let one = settings(1);

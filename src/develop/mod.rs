@@ -6,6 +6,8 @@
 //! 8-bit level.
 
 mod a_trous;
+mod passes;
+mod picture;
 #[cfg(test)]
 pub(crate) mod tests;
 mod upload;
@@ -15,69 +17,13 @@ use glam::Mat3;
 
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
-use crate::render::gpu::{DeviceFilm, Gpu, buffer, texture};
+use crate::render::gpu::{Gpu, buffer};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
+use passes::{dispatch, entry, pipelines, stored};
+pub(crate) use picture::{DisplayTexture, LinearPicture, OverlayTexture};
 
 /// Pixels across of the picture that the exposure is taken from: so coarse that noise averages out.
 const EXPOSURE_WIDTH: u32 = 64;
-/// Texels of overlays and of developed pictures.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Pixels along a side of a workgroup's tile, as in the shaders.
-const TILE: u32 = 8;
-
-/// Linear radiance on a device; clones share it, and only those are equal.
-#[derive(Clone, PartialEq)]
-pub(crate) struct LinearPicture {
-    film: DeviceFilm,
-    /// Whether it may change by itself.
-    pub(crate) is_live: bool,
-}
-
-impl LinearPicture {
-    /// The film of a renderer on the same device, which may still be adding to it.
-    pub(crate) fn live(film: DeviceFilm) -> Self {
-        Self { is_live: true, ..Self::fixed(film) }
-    }
-
-    /// Sums that nobody will change.
-    fn fixed(film: DeviceFilm) -> Self {
-        Self { film, is_live: false }
-    }
-
-    /// Its sums.
-    #[cfg(test)]
-    pub(crate) fn film(&self) -> &DeviceFilm {
-        &self.film
-    }
-
-    /// Pixels across and down.
-    pub(crate) fn size(&self) -> [u32; 2] {
-        [self.film.width, self.film.height]
-    }
-}
-
-/// Colours to be blended over a picture of the same size; clones share them, and only those are equal.
-#[derive(Clone, PartialEq)]
-pub(crate) struct OverlayTexture(wgpu::TextureView);
-
-/// A developed picture; clones share it.
-#[derive(Clone)]
-pub(crate) struct DisplayTexture {
-    texture: wgpu::Texture,
-    view: wgpu::TextureView,
-}
-
-impl DisplayTexture {
-    /// For whoever draws it: 8-bit sRGB levels that are not to be decoded again, opaque.
-    pub(crate) fn view(&self) -> &wgpu::TextureView {
-        &self.view
-    }
-
-    /// Pixels across and down.
-    pub(crate) fn size(&self) -> [u32; 2] {
-        [self.texture.width(), self.texture.height()]
-    }
-}
 
 /// How a picture is developed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +75,8 @@ impl DeviceSettings {
 
 /// What develops pictures on one device.
 pub(crate) struct Developer {
-    gpu: Gpu,
+    /// The device.
+    pub(crate) gpu: Gpu,
     develop: wgpu::ComputePipeline,
     shrink: wgpu::ComputePipeline,
     a_trous: a_trous::Passes,
@@ -142,25 +89,13 @@ impl Developer {
     /// # Errors
     /// If the driver refuses it.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self> {
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("develop"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/develop.wgsl").into()),
-        });
-        let no_overlay = upload::overlay(gpu, [1, 1], &[[0; 4]]);
-        let developer = Self {
-            develop: pipeline(gpu, &shader, "develop"),
-            shrink: pipeline(gpu, &shader, "shrink"),
-            a_trous: a_trous::Passes::new(gpu),
-            gpu: gpu.clone(),
-            no_overlay,
-        };
+        let source = include_str!("../../shaders/develop.wgsl").into();
+        let [develop, shrink] = pipelines(gpu, "develop", source, ["develop", "shrink"]);
+        let no_overlay = OverlayTexture::new(gpu, [1, 1], &[[0; 4]]);
+        let a_trous = a_trous::Passes::new(gpu);
+        let developer = Self { gpu: gpu.clone(), develop, shrink, a_trous, no_overlay };
         gpu.check()?;
         Ok(developer)
-    }
-
-    /// The device.
-    pub(crate) fn gpu(&self) -> &Gpu {
-        &self.gpu
     }
 
     /// The picture through the à-trous filter; as it is without layers or
@@ -202,7 +137,7 @@ impl Developer {
             small_size: [width, height],
             ..DeviceSettings::new(picture, &settings)
         };
-        let settings = self.buffer(bytemuck::bytes_of(&settings));
+        let settings = stored(&self.gpu, &[settings]);
         let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let small = buffer(&self.gpu.device, Some("small picture"), bytes, usage);
@@ -216,16 +151,6 @@ impl Developer {
         Ok(Image { width, height, pixels })
     }
 
-    /// A texture to develop pictures of this size into.
-    pub(crate) fn display_texture(&self, size: [u32; 2]) -> DisplayTexture {
-        let usage = wgpu::TextureUsages::STORAGE_BINDING
-            | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC;
-        let texture = texture(&self.gpu.device, Some("developed picture"), size, FORMAT, usage);
-        let view = texture.create_view(&Default::default());
-        DisplayTexture { texture, view }
-    }
-
     /// Develops a picture into a texture of its size; does not wait for the device.
     pub(crate) fn develop(
         &self,
@@ -236,7 +161,7 @@ impl Developer {
     ) {
         let has_overlay = overlay.is_some().into();
         let settings = DeviceSettings { has_overlay, ..DeviceSettings::new(picture, settings) };
-        let settings = self.buffer(bytemuck::bytes_of(&settings));
+        let settings = stored(&self.gpu, &[settings]);
         let OverlayTexture(overlay) = overlay.unwrap_or(&self.no_overlay);
         let textures = [(4, overlay), (5, &display.view)].map(|(binding, view)| {
             wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) }
@@ -252,7 +177,7 @@ impl Developer {
     /// # Errors
     /// If the device fails.
     pub(crate) fn read(&self, display: &DisplayTexture) -> Result<Rgb8> {
-        self.gpu.read_texture(&display.texture)
+        self.gpu.read_texture(display.view.texture())
     }
 
     /// What both entry points read.
@@ -264,46 +189,4 @@ impl Developer {
         let film = &picture.film;
         [entry(0, settings), entry(1, &film.sum), entry(2, &film.counts)]
     }
-}
-
-/// A buffer of these bytes. It is written by the queue, for mapping panics where the device is lost.
-fn filled(gpu: &Gpu, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let usage = usage | wgpu::BufferUsages::COPY_DST;
-    let buffer = buffer(&gpu.device, None, bytes.len() as u64, usage);
-    gpu.queue.write_buffer(&buffer, 0, bytes);
-    buffer
-}
-
-fn entry(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
-    wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }
-}
-
-fn pipeline(gpu: &Gpu, shader: &wgpu::ShaderModule, name: &str) -> wgpu::ComputePipeline {
-    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(name),
-        layout: None,
-        module: shader,
-        entry_point: Some(name),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    })
-}
-
-/// One invocation for each pixel.
-fn dispatch(
-    gpu: &Gpu,
-    commands: &mut wgpu::CommandEncoder,
-    pipeline: &wgpu::ComputePipeline,
-    entries: &[wgpu::BindGroupEntry<'_>],
-    [width, height]: [u32; 2],
-) {
-    let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries,
-    });
-    let mut pass = commands.begin_compute_pass(&Default::default());
-    pass.set_pipeline(pipeline);
-    pass.set_bind_group(0, &bind_group, &[]);
-    pass.dispatch_workgroups(width.div_ceil(TILE), height.div_ceil(TILE), 1);
 }

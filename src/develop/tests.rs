@@ -23,7 +23,7 @@ fn developed(
     overlay: Option<&OverlayTexture>,
     settings: &DevelopSettings,
 ) -> Rgb8 {
-    let display = developer.display_texture(picture.size());
+    let display = DisplayTexture::new(&developer.gpu, picture.size());
     developer.develop(picture, overlay, settings, &display);
     developer.read(&display).expect("read back")
 }
@@ -79,7 +79,7 @@ fn difference(a: &Rgb8, b: &Rgb8) -> (u8, f64) {
 fn pictures_are_those_of_the_cpu_within_one_level() {
     let Some(developer) = developer() else { return };
     let image = extremes();
-    let picture = developer.upload_image(&image);
+    let picture = LinearPicture::of_image(&developer.gpu, &image);
     let balances = [(DAYLIGHT_KELVIN, 0.0), (2000.0, 0.0), (12000.0, -1.0), (3200.0, 1.0)];
     for (kelvin, tint) in balances {
         let white_balance = WhiteBalance { kelvin, tint };
@@ -135,7 +135,7 @@ fn film(width: u32, height: u32, samples: u32) -> Film {
 fn films_give_their_means_and_the_exposure_of_the_cpu() {
     let Some(developer) = developer() else { return };
     let film = film(201, 77, 5);
-    let picture = developer.upload_film(&film, false);
+    let picture = LinearPicture::of_film(&developer.gpu, &film, false);
     let settings = settings(ToneCurve::Agx, 0.5);
     let found = developed(&developer, &picture, None, &settings);
     let expected = display_rgb8(&film.image(), settings.exposure_ev, settings.curve);
@@ -162,7 +162,7 @@ fn the_filter_is_that_of_the_cpu() {
     for samples in [1, 2, 7] {
         // So narrow that it is not made smaller.
         let film = film(EXPOSURE_WIDTH, 90, samples);
-        let picture = developer.denoised(&developer.upload_film(&film, true));
+        let picture = developer.denoised(&LinearPicture::of_film(&developer.gpu, &film, true));
         let found = developer.shrunk(&picture, WhiteBalance::default()).expect("read back");
         let expected = denoise::quick(&film, None);
         assert_ne!(expected.pixels, film.image().pixels, "something was filtered");
@@ -178,10 +178,10 @@ fn the_filter_is_that_of_the_cpu() {
 fn overlays_are_blended_and_the_rest_steps_back() {
     let Some(developer) = developer() else { return };
     let image = Image::from_fn(40, 30, |x, y| [x as f32 / 40.0, y as f32 / 30.0, 0.2]);
-    let picture = developer.upload_image(&image);
+    let picture = LinearPicture::of_image(&developer.gpu, &image);
     let colors: Vec<_> =
         (0..1200_u32).map(|i| (i % 3 > 0).then_some([i as u8, (i / 7) as u8, 200])).collect();
-    let overlay = developer.upload_overlay(&colors, 40, &picture);
+    let overlay = OverlayTexture::of_colors(&developer.gpu, &colors, 40, &picture);
     let plain = settings(ToneCurve::None, 0.0);
     let under = developed(&developer, &picture, None, &plain);
     for opacity in [0.0, 0.35, 0.7, 1.0] {
@@ -204,10 +204,10 @@ fn overlays_are_blended_and_the_rest_steps_back() {
 fn a_picture_too_large_for_the_device_becomes_smaller() {
     let Some(mut developer) = developer() else { return };
     developer.gpu.limits.max_texture_dimension_2d = 32;
-    let picture = developer.upload_film(&film(100, 40, 1), true);
+    let picture = LinearPicture::of_film(&developer.gpu, &film(100, 40, 1), true);
     assert_eq!(picture.size(), [32, 12]);
     let colors = vec![Some([7, 8, 9]); 4000];
-    let overlay = developer.upload_overlay(&colors, 100, &picture);
+    let overlay = OverlayTexture::of_colors(&developer.gpu, &colors, 100, &picture);
     let settings = DevelopSettings { opacity: [1.0; 2], ..settings(ToneCurve::Agx, 0.0) };
     let found = developed(&developer, &picture, Some(&overlay), &settings);
     assert!(found.pixels.iter().all(|pixel| *pixel == [7, 8, 9]));

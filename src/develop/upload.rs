@@ -2,20 +2,26 @@
 
 use rayon::prelude::*;
 
-use super::{Developer, FORMAT, LinearPicture, OverlayTexture, filled};
+use super::passes::stored;
+use super::picture::{LinearPicture, OverlayTexture};
 use crate::image::Image;
 use crate::render::film::{Film, Surface};
-use crate::render::gpu::{DeviceFilm, Gpu, texture};
+use crate::render::gpu::{DeviceFilm, Gpu};
 
 /// Bytes of a pixel's sums, and of its counts.
 const PIXEL_BYTES: u64 = 16;
 
-impl Developer {
+impl LinearPicture {
+    /// Whether a picture of this size fits on the device.
+    pub(crate) fn fits(gpu: &Gpu, width: u32, height: u32) -> bool {
+        most_width(gpu, width, height) >= width
+    }
+
     /// A film's sums; `layers` asks for its layers too, where it has them. A film that does not fit
     /// on the device becomes a smaller picture.
-    pub(crate) fn upload_film(&self, film: &Film, layers: bool) -> LinearPicture {
-        if !self.can_show(film.width, film.height) {
-            return self.upload_image(&film.image());
+    pub(crate) fn of_film(gpu: &Gpu, film: &Film, layers: bool) -> Self {
+        if !Self::fits(gpu, film.width, film.height) {
+            return Self::of_image(gpu, &film.image());
         }
         let pixels = film.pixels();
         let sums: Vec<[f32; 4]> =
@@ -24,11 +30,11 @@ impl Developer {
         let surfaces = (layers && film.has_layers()).then(|| {
             let sums = |surface: &Surface| surface.sums().map(|sum| sum as f32);
             let surfaces: Vec<[f32; 8]> = film.surfaces().par_iter().map(sums).collect();
-            self.buffer(bytemuck::cast_slice(&surfaces))
+            stored(gpu, &surfaces)
         });
-        LinearPicture::fixed(DeviceFilm {
-            sum: self.buffer(bytemuck::cast_slice(&sums)),
-            counts: self.buffer(bytemuck::cast_slice(&counts)),
+        Self::fixed(DeviceFilm {
+            sum: stored(gpu, &sums),
+            counts: stored(gpu, &counts),
             surfaces,
             width: film.width,
             height: film.height,
@@ -37,29 +43,33 @@ impl Developer {
     }
 
     /// A picture, smaller if it does not fit on the device.
-    pub(crate) fn upload_image(&self, image: &Image) -> LinearPicture {
-        let most = self.most_width(image.width, image.height);
+    pub(crate) fn of_image(gpu: &Gpu, image: &Image) -> Self {
+        let most = most_width(gpu, image.width, image.height);
         if most < image.width {
-            return self.upload_image(&image.shrunk(most));
+            return Self::of_image(gpu, &image.shrunk(most));
         }
-        LinearPicture::fixed(DeviceFilm {
-            sum: self.pixels(image),
-            counts: self.buffer(bytemuck::cast_slice(&vec![[1_u32, 0, 0, 0]; image.pixels.len()])),
+        let pixels: Vec<[f32; 4]> =
+            image.pixels.par_iter().map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
+        Self::fixed(DeviceFilm {
+            sum: stored(gpu, &pixels),
+            counts: stored(gpu, &vec![[1_u32, 0, 0, 0]; pixels.len()]),
             surfaces: None,
             width: image.width,
             height: image.height,
             scale: 1.0,
         })
     }
+}
 
+impl OverlayTexture {
     /// An overlay for a picture: colours of an sRGB display, row after row of `width` pixels, `None`
     /// where it has nothing to say.
-    pub(crate) fn upload_overlay(
-        &self,
+    pub(crate) fn of_colors(
+        gpu: &Gpu,
         colors: &[Option<[u8; 3]>],
         width: u32,
         picture: &LinearPicture,
-    ) -> OverlayTexture {
+    ) -> Self {
         let [to_width, to_height] = picture.size();
         let height = colors.len() as u64 / u64::from(width).max(1);
         // A picture that was too large is smaller than its overlay.
@@ -75,45 +85,17 @@ impl Developer {
             })
             .map(Option::unwrap_or_default)
             .collect();
-        overlay(&self.gpu, picture.size(), &texels)
-    }
-
-    /// Whether a picture of this size fits on the device.
-    pub(crate) fn can_show(&self, width: u32, height: u32) -> bool {
-        self.most_width(width, height) >= width
-    }
-
-    /// Most pixels across for a picture of this shape to fit on the device.
-    fn most_width(&self, width: u32, height: u32) -> u32 {
-        let limits = &self.gpu.limits;
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let side = f64::from(limits.max_texture_dimension_2d);
-        let (width, height) = (f64::from(width), f64::from(height));
-        let pixels = bytes as f64 / PIXEL_BYTES as f64;
-        let scale = (side / width).min(side / height).min((pixels / (width * height)).sqrt());
-        if scale >= 1.0 { width as u32 } else { (width * scale).max(1.0) as u32 }
-    }
-
-    fn pixels(&self, image: &Image) -> wgpu::Buffer {
-        let pixels: Vec<[f32; 4]> =
-            image.pixels.par_iter().map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
-        self.buffer(bytemuck::cast_slice(&pixels))
-    }
-
-    pub(super) fn buffer(&self, bytes: &[u8]) -> wgpu::Buffer {
-        filled(&self.gpu, wgpu::BufferUsages::STORAGE, bytes)
+        Self::new(gpu, picture.size(), &texels)
     }
 }
 
-pub(super) fn overlay(gpu: &Gpu, size: [u32; 2], texels: &[[u8; 4]]) -> OverlayTexture {
-    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-    let texture = texture(&gpu.device, Some("overlay"), size, FORMAT, usage);
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(4 * size[0]),
-        rows_per_image: None,
-    };
-    let (place, texels) = (texture.as_image_copy(), bytemuck::cast_slice(texels));
-    gpu.queue.write_texture(place, texels, layout, texture.size());
-    OverlayTexture(texture.create_view(&Default::default()))
+/// Most pixels across for a picture of this shape to fit on the device.
+fn most_width(gpu: &Gpu, width: u32, height: u32) -> u32 {
+    let limits = &gpu.limits;
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let side = f64::from(limits.max_texture_dimension_2d);
+    let (width, height) = (f64::from(width), f64::from(height));
+    let pixels = bytes as f64 / PIXEL_BYTES as f64;
+    let scale = (side / width).min(side / height).min((pixels / (width * height)).sqrt());
+    if scale >= 1.0 { width as u32 } else { (width * scale).max(1.0) as u32 }
 }

@@ -77,9 +77,6 @@ const IN_CIRCLES: &[&str] = &[
     "cli",
     "cli/absent",
     "cli/generate",
-    "develop",
-    "develop/a_trous",
-    "develop/upload",
     "path",
     "path/learn",
     "path/light_tree",
@@ -95,8 +92,6 @@ const IN_CIRCLES: &[&str] = &[
 const USE_THEIR_PARENT: &[&str] = &[
     "cli/absent",
     "cli/generate",
-    "develop/a_trous",
-    "develop/upload",
     "path/cached",
     "path/gather",
     "path/learn",
@@ -109,7 +104,7 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11495),
+    ("app", 11491),
     ("bench", 567),
     ("bsdf", 1487),
     ("bvh", 1421),

@@ -11,7 +11,7 @@ use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
 use crate::app::overlays::{CellFacts, Overlay, Sources};
 use crate::app::worker::{Request, Snapshot};
-use crate::develop::{Developer, LinearPicture};
+use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
@@ -124,7 +124,7 @@ impl Memory {
         if let Some((image, automatic_ev)) = self.ahead(order, &source) {
             // It has no samples of the request's own.
             let prepared = Prepared { is_carried: true, ..Prepared::of(&developer, image) };
-            developer.gpu().check()?;
+            developer.gpu.check()?;
             let automatic_ev = order.metered.map_or(0.0, |_| automatic_ev);
             return Ok(Some(shown(order, prepared, automatic_ev)));
         }
@@ -200,7 +200,7 @@ impl Memory {
             };
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
-        developer.gpu().check()?;
+        developer.gpu.check()?;
         let prepared = Prepared { picture, image, is_carried, failure };
         let shown = shown(order, prepared, automatic_ev);
         Ok(Some(Shown { other, difference, uncompared, painted, ..shown }))
@@ -284,7 +284,8 @@ impl Memory {
             sun: order.sun.as_ref(),
         };
         let painted = sources.paint(overlay)?;
-        let colors = order.developer.upload_overlay(&painted.colors, session.film.width, picture);
+        let (gpu, width) = (&order.developer.gpu, session.film.width);
+        let colors = OverlayTexture::of_colors(gpu, &painted.colors, width, picture);
         Some(Painted { colors, legend: painted.legend, labels: painted.labels })
     }
 

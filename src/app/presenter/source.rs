@@ -26,7 +26,7 @@ pub(super) struct Prepared {
 impl Prepared {
     pub(super) fn of(developer: &Developer, image: impl Into<Arc<Image>>) -> Self {
         let image = image.into();
-        let picture = developer.upload_image(&image);
+        let picture = LinearPicture::of_image(&developer.gpu, &image);
         Self { picture, image: Some(image), is_carried: false, failure: None }
     }
 
@@ -107,12 +107,13 @@ impl Source {
     /// The picture on the device, without noise if that is asked for; `None` if that was cancelled.
     pub(super) fn prepare(&self, developer: &Developer, cancel: &AtomicBool) -> Option<Prepared> {
         let film = &self.session.film;
-        let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
+        let gpu = &developer.gpu;
+        let is_here = |(its, _): &&(Gpu, DeviceFilm)| {
+            its.is_same(gpu) && LinearPicture::fits(gpu, film.width, film.height)
+        };
         let noisy = |layers| match self.session.on_device.as_ref().filter(is_here) {
-            Some((_, on_device)) if developer.can_show(film.width, film.height) => {
-                LinearPicture::live(on_device.clone())
-            }
-            _ => developer.upload_film(film, layers),
+            Some((_, film)) => LinearPicture { film: film.clone(), is_live: true },
+            None => LinearPicture::of_film(gpu, film, layers),
         };
         let other = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
         let raw = || Prepared::of(developer, film.without_gaps().image());
@@ -213,11 +214,11 @@ pub(super) mod tests {
             prepared.expect("not cancelled").picture.is_live
         };
         assert!(!is_live(&developer, &session, None));
-        let uploaded = developer.upload_film(&session.film, true);
-        session.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
+        let uploaded = LinearPicture::of_film(&developer.gpu, &session.film, true);
+        session.on_device = Some((developer.gpu.clone(), uploaded.film.clone()));
         assert!(is_live(&developer, &session, None));
         assert!(!is_live(&other, &session, None));
         assert!(!is_live(&developer, &session, Some(Denoiser::ATrous)));
-        developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
+        developer.gpu.check().and(other.gpu.check()).expect("no buffer is used elsewhere");
     }
 }
