@@ -3,8 +3,6 @@
 
 use std::ffi::OsString;
 
-use crate::error::{Error, Result};
-
 /// Arguments of a command that is not there.
 #[derive(Debug, Default, clap::Args)]
 #[command(disable_help_flag = true)]
@@ -17,10 +15,11 @@ pub(super) struct Words {
 macro_rules! absent {
     ($name:ident, $arguments:ident, $sentence:literal) => {
         pub(super) mod $name {
-            pub(in crate::cli) use super::Words as $arguments;
+            pub(in crate::cli) use crate::cli::absent::Words as $arguments;
+            use crate::error::{Error, Result};
 
-            pub(in crate::cli) fn run(_: &super::Words) -> super::Result<()> {
-                Err(super::Error::new(concat!("this lightgrid was built without ", $sentence)))
+            pub(in crate::cli) fn run(_: &$arguments) -> Result<()> {
+                Err(Error::new(concat!("this lightgrid was built without ", $sentence)))
             }
         }
     };

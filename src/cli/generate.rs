@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Command, CommandFactory as _};
+use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
 
-use super::Arguments;
 use super::picture::say_written;
 use crate::error::{Error, Result};
 use crate::image::write_beside_and_rename;
@@ -33,28 +32,28 @@ pub(super) struct ManArguments {
     folder: PathBuf,
 }
 
-/// Prints what completes commands in a shell.
-pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
+/// Prints what completes the commands of `program` in a shell.
+pub(super) fn completions(arguments: &CompletionsArguments, mut program: Command) -> Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), "lightgrid", &mut script);
+    clap_complete::generate(arguments.shell, &mut program, "lightgrid", &mut script);
     print(String::from_utf8_lossy(&script).trim_end())
 }
 
-/// Writes a manual page for each command.
-pub(super) fn man(arguments: &ManArguments) -> Result<()> {
+/// Writes a manual page for each command of `program`.
+pub(super) fn man(arguments: &ManArguments, program: Command) -> Result<()> {
     let ManArguments { folder } = arguments;
     if !folder.is_dir() {
         return Err(Error::at(folder, "is no folder that exists"));
     }
-    let mut command = Arguments::command().disable_help_subcommand(true);
-    command.build();
+    let mut program = program.disable_help_subcommand(true);
+    program.build();
     let write = |command: &Command| {
         let page = Man::new(command.clone());
         let path = folder.join(page.get_filename());
         let written = write_beside_and_rename(&path, |file| page.render(file));
         written.map(|()| say_written(&path)).err()
     };
-    Error::all(with_subcommands(&command).into_iter().filter_map(write).collect())
+    Error::all(with_subcommands(&program).into_iter().filter_map(write).collect())
 }
 
 /// A command and those beneath it that are shown.

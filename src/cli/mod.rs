@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub use crate::out_of_memory::Allocator;
 
@@ -182,8 +182,8 @@ fn run(arguments: Arguments) -> Result<()> {
         Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),
-        Command::Completions(arguments) => generate::completions(arguments),
-        Command::Man(arguments) => generate::man(arguments),
+        Command::Completions(arguments) => generate::completions(arguments, Arguments::command()),
+        Command::Man(arguments) => generate::man(arguments, Arguments::command()),
     }
 }
 

@@ -74,9 +74,6 @@ const LARGE_TYPES: [(&str, usize); 0] = [];
 
 /// Files that use each other in a circle. The list is to become shorter.
 const IN_CIRCLES: &[&str] = &[
-    "cli",
-    "cli/absent",
-    "cli/generate",
     "path",
     "path/learn",
     "path/light_tree",
@@ -90,8 +87,6 @@ const IN_CIRCLES: &[&str] = &[
 
 /// Files that use an item that the module above them declares. The list is to become shorter.
 const USE_THEIR_PARENT: &[&str] = &[
-    "cli/absent",
-    "cli/generate",
     "path/cached",
     "path/gather",
     "path/learn",
@@ -108,7 +103,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("bench", 567),
     ("bsdf", 1487),
     ("bvh", 1421),
-    ("cli", 3448),
+    ("cli", 3447),
     ("color", 27),
     ("denoise", 1024),
     ("develop", 422),
