@@ -1,23 +1,8 @@
-//! Where to render.
-
-use serde::{Deserialize, Serialize};
+//! Opens the device that is chosen.
 
 use super::gpu::{self, Gpu};
-use super::gpu_facts::AdapterFacts;
+use super::gpu_facts::{AdapterFacts, DeviceChoice};
 use crate::error::{Error, Result};
-
-/// Where to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeviceChoice {
-    /// A real GPU if there is one and everything fits on it, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, be it a software one, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
 
 impl DeviceChoice {
     /// Connects to the GPU that is chosen, the best whose name or backend contains `adapter`;

@@ -2,6 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Where to render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceChoice {
+    /// A real GPU if there is one and everything fits on it, else the CPU.
+    #[default]
+    Auto,
+    /// A GPU, be it a software one, or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
 /// What finds the surfaces that rays hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -13,10 +13,9 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::{Lit, World};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
-pub use super::devices::DeviceChoice;
 pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
-    AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
+    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
 
 /// What is said where a GPU is asked for.

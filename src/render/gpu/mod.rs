@@ -62,10 +62,9 @@ use queue::Queue;
 use sharing::Sharing;
 use uploaded_scene::put_array;
 
-pub use super::devices::DeviceChoice;
 pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
-    AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
+    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
 pub(crate) use buffer::{buffer, texture};
 pub(crate) use cast::Caster;
