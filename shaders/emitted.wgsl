@@ -1,4 +1,4 @@
-// Emissive triangles that a path meets: twin of `Path::add_emitted` in src/path/mod.rs.
+// Emissive triangles that a path meets: twin of `Path::add_emitted` in src/path/tracer.rs.
 
 fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
     if point.parameters.unlit {

@@ -1,5 +1,5 @@
 // The split of a BSDF into its narrow and its broad lobes: twin of `Bsdf::split` in src/bsdf/mod.rs, of
-// src/bsdf/lobes.rs, of src/path/splitting.rs, of `Path::is_in_air` in src/path/mod.rs and of fields of
+// src/bsdf/lobes.rs, of src/path/splitting.rs, of `Path::is_in_air` in src/path/tracer.rs and of fields of
 // `SurfaceScatterer` in src/path/vertex.rs.
 
 // Whether coat and interface are narrower than GGX makes them with this alpha.

@@ -1,5 +1,5 @@
 // Surfaces that a ray does not meet or goes straight through: twin of src/path/world.rs and of `Path::passes` in
-// src/path/mod.rs.
+// src/path/tracer.rs.
 
 //#if PARTIAL
 // Share of light that goes straight through a surface: what alpha does not cover, and what smooth

@@ -1,4 +1,4 @@
-// The path tracing loop, one ray a step: twin of src/path/mod.rs, src/path/looks.rs and src/path/vertex.rs, the same
+// The path tracing loop, one ray a step: twin of src/path/tracer.rs, src/path/looks.rs and src/path/vertex.rs, the same
 // random numbers.
 
 struct Path {

@@ -1,4 +1,4 @@
-// Vertices between surfaces: twin of `Path::fly` in src/path/mod.rs.
+// Vertices between surfaces: twin of `Path::fly` in src/path/tracer.rs.
 
 // What fills the way of a ray from where the path is.
 fn stretch_ahead(

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::Path;
 use super::splitting::MIN_CACHED_ALPHA;
+use super::tracer::Path;
 use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
 use crate::radiance_cache::RadianceCache;
 

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::Path;
 use super::shadows::{Course, GlassWalk, Sight};
 use super::sharing::SharedTile;
+use super::tracer::Path;
 use super::vertex::{Arriving, Vertex};
 use crate::bvh::Ray;
 use crate::environment::TileSearch;

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
+use super::tracer::{Path, PathTracer};
 use super::vertex::{Scatterer, Vertex};
-use super::{Path, PathTracer};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
 use crate::light_grid::LearningGrid;

@@ -34,6 +34,9 @@ pub(crate) const MIN_SURVIVAL: f32 = 0.05;
 /// Most perfect reflections and refractions in a row; only light that is caught in a solid has more.
 pub(crate) const MAX_INTERFACES: u32 = 64;
 
+/// Panes and leaves one ray may pass; only a scene that is broken has more.
+pub(crate) const MAX_PASSES: u32 = 1000;
+
 /// What a path still carries where a limit ends it: its throughput's largest component, 0 for a limit that has not
 /// ended it. The mean over paths is the share of light that a picture lacks, where all places are as bright.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

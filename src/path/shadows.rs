@@ -10,10 +10,15 @@ use glam::Vec3;
 
 use super::body::Body;
 use super::light_tree::Receiver;
+use super::lights;
+use super::limits::{MAX_INTERFACES, MAX_PASSES};
+use super::tracer::{Departure, Path, PathTracer};
 use super::vertex::{Scatterer, Vertex};
-use super::{Departure, MAX_INTERFACES, MAX_PASSES, Path, PathTracer, SHADOW_RAY_SHARE, lights};
 use crate::bvh::{Ray, offset_origin};
 use crate::scene::needs::SceneFeatures;
+
+/// Share of the way to a light, or to a vertex, that a shadow ray goes: it stops short of that surface.
+pub(crate) const SHADOW_RAY_SHARE: f32 = 1.0 - 1e-4;
 
 /// What lies between a vertex and a light.
 pub(super) enum Sight {
@@ -52,7 +57,9 @@ impl Path<'_> {
     pub(super) fn sight(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Sight {
         let world = self.tracer.world;
         let behind = match &vertex.scatterer {
-            Scatterer::Surface(surface) => surface.behind.filter(|_| !surface.is_above(direction)),
+            Scatterer::Surface(surface) => {
+                surface.behind.filter(|_| !surface.sides.is_above(direction))
+            }
             Scatterer::Medium(_) => None,
         };
         let body = behind.copied().unwrap_or(self.body);

@@ -19,9 +19,10 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::shadows::SHADOW_RAY_SHARE;
 use super::splitting::{MIN_SHARED_ALPHA, MIN_WHOLE_ALPHA, UseOfVertices};
+use super::tracer::{Path, PathResult, PathTracer};
 use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
-use super::{Path, PathResult, PathTracer, SHADOW_RAY_SHARE};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
 use crate::medium::{Crossing, Phase};
@@ -423,7 +424,7 @@ impl Path<'_> {
             let (wi, agrees) = match &vertex.scatterer {
                 Scatterer::Surface(surface) => {
                     let wi = surface.shading_frame.local_from_world(direction);
-                    (wi, (wi.z > 0.0) == surface.is_above(direction))
+                    (wi, (wi.z > 0.0) == surface.sides.is_above(direction))
                 }
                 Scatterer::Medium(_) => (direction, true),
             };

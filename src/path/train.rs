@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 
+use super::limits::PathLimits;
 use super::splitting::UseOfVertices;
+use super::tracer::{Path, PathTracer};
 use super::vertex::{Scatterer, Vertex};
-use super::{Path, PathLimits, PathTracer};
 use crate::bvh::Ray;
 use crate::color::luminance;
 use crate::radiance_cache::{RadianceCache, RadianceSums};

@@ -54,6 +54,7 @@ pub(super) struct MediumScatterer {
 }
 
 pub(super) struct SurfaceScatterer<'v> {
+    /// Above is where the path came from.
     pub(super) sides: Sides,
     pub(super) shading_frame: Frame,
     /// Towards where the path came from, in the shading frame.
@@ -100,7 +101,7 @@ impl Scatterer<'_> {
     /// Where a ray from `position` in this direction begins.
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
         match self {
-            Self::Surface(surface) => surface.origin_toward(position, direction),
+            Self::Surface(surface) => surface.sides.origin_toward(position, direction),
             Self::Medium(_) => position,
         }
     }
@@ -129,7 +130,7 @@ impl<'v> SurfaceScatterer<'v> {
     /// black, or where shading and geometric normal disagree about the side.
     pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         let wi = self.shading_frame.local_from_world(direction);
-        if (wi.z > 0.0) != self.is_above(direction) {
+        if (wi.z > 0.0) != self.sides.is_above(direction) {
             return None;
         }
         let (f, pdf_solid_angle) = self.bsdf.eval_pdf(wi);
@@ -143,22 +144,12 @@ impl<'v> SurfaceScatterer<'v> {
         let direction = self.shading_frame.world_from_local(sample.wi).normalize();
         let is_through = sample.is_transmission;
         let pdf_solid_angle = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
-        (self.is_above(direction) != is_through).then_some(Onward {
+        (self.sides.is_above(direction) != is_through).then_some(Onward {
             direction,
             weight: sample.weight,
             pdf_solid_angle,
             is_through,
         })
-    }
-
-    /// Whether a direction points to the side that the path came from.
-    pub(super) fn is_above(&self, direction: Vec3) -> bool {
-        self.sides.is_above(direction)
-    }
-
-    /// Where a ray from `position` in this direction begins.
-    pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
-        self.sides.origin_toward(position, direction)
     }
 }
 

@@ -8,7 +8,8 @@ use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::math::Frame;
 use crate::path::camera::CameraRays;
-use crate::path::{CutOff, Lit, MAX_INTERFACES, World};
+use crate::path::limits::{CutOff, MAX_INTERFACES};
+use crate::path::{Lit, World};
 use crate::sampler::Sampler;
 
 /// Rays along each axis of the picture.

@@ -73,26 +73,11 @@ const MAX_METHODS: usize = 40;
 const LARGE_TYPES: [(&str, usize); 0] = [];
 
 /// Files that use each other in a circle. The list is to become shorter.
-const IN_CIRCLES: &[&str] = &[
-    "path",
-    "path/learn",
-    "path/light_tree",
-    "path/light_tree/build",
-    "path/lights",
-    "path/train",
-    "path/world",
-];
+const IN_CIRCLES: &[&str] =
+    &["path/light_tree", "path/light_tree/build", "path/lights", "path/world"];
 
 /// Files that use an item that the module above them declares. The list is to become shorter.
-const USE_THEIR_PARENT: &[&str] = &[
-    "path/cached",
-    "path/gather",
-    "path/learn",
-    "path/light_tree/build",
-    "path/shadows",
-    "path/sharing",
-    "path/train",
-];
+const USE_THEIR_PARENT: &[&str] = &["path/light_tree/build"];
 
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
@@ -120,10 +105,10 @@ const BUDGETS: [(&str, usize); 37] = [
     ("noise", 79),
     ("out_of_memory", 78),
     ("output", 604),
-    ("path", 2875),
+    ("path", 2878),
     ("prefetch", 14),
     ("radiance_cache", 327),
-    ("render", 6482),
+    ("render", 6483),
     ("report", 3083),
     ("sampler", 143),
     ("scene", 9906),

@@ -6,7 +6,7 @@ use super::layout::{DIRECTIONAL_LIGHT, NO_TEXTURE, PUNCTUAL_WORDS, SPOT_LIGHT};
 use super::layout::{material_flags as material, texture_flags};
 use crate::bsdf::{albedo, coat, interface, lobes, microfacet, rescatter, sheen};
 use crate::light_grid::{WHOLE_MAP, cells, counters};
-use crate::path::{self, light_tree, sharing, splitting, train};
+use crate::path::{self, light_tree, limits, shadows, sharing, splitting, train};
 use crate::radiance_cache as cache;
 use crate::render::{cpu, filter};
 use crate::sampler;
@@ -83,11 +83,11 @@ constants! {
     MIN_SHARED_NARROW: splitting::MIN_SHARED_NARROW,
     MIN_COSINE: light_tree::MIN_COSINE,
     MIN_SHARE: train::MIN_SHARE,
-    MIN_SURVIVAL: path::MIN_SURVIVAL,
+    MIN_SURVIVAL: limits::MIN_SURVIVAL,
     LIGHT_LEAF: light_tree::LEAF,
-    MAX_INTERFACES: path::MAX_INTERFACES,
+    MAX_INTERFACES: limits::MAX_INTERFACES,
     MAX_NARROW_SHARE: lobes::MAX_NARROW_SHARE,
-    MAX_PASSES: path::MAX_PASSES,
+    MAX_PASSES: limits::MAX_PASSES,
     MAX_WEIGHT: counters::MAX_WEIGHT,
     MEDIUM_FACE: cells::MEDIUM_FACE,
     MIN_COSINE_SHARE: surface::MIN_COSINE_SHARE,
@@ -108,9 +108,9 @@ constants! {
     RESCATTER_INDICES: rescatter::INDICES,
     RESCATTER_MIN_LOSS: rescatter::MIN_LOSS,
     RESCATTER_NODES: rescatter::NODES,
-    ROULETTE_AFTER: path::ROULETTE_AFTER,
-    ROULETTE_MILDNESS: path::ROULETTE_MILDNESS,
-    SHADOW_RAY_SHARE: path::SHADOW_RAY_SHARE,
+    ROULETTE_AFTER: limits::ROULETTE_AFTER,
+    ROULETTE_MILDNESS: limits::ROULETTE_MILDNESS,
+    SHADOW_RAY_SHARE: shadows::SHADOW_RAY_SHARE,
     SHEEN_NODES: sheen::COSINES,
     SHEEN_TYPICAL: sheen::Sheen::TYPICAL,
     SECOND_UV_SET: texture_flags::SECOND_UV_SET,
