@@ -6,7 +6,7 @@ use super::shadows::{Course, GlassWalk, Sight};
 use super::sharing::SharedTile;
 use super::tracer::Path;
 use super::vertex::{Arriving, Vertex};
-use crate::bvh::Ray;
+use crate::bvh::{Hit, Ray};
 use crate::environment::TileSearch;
 use crate::light_grid::TileChoice;
 use crate::math::balance_heuristic;
@@ -91,7 +91,9 @@ impl Path<'_> {
 
     fn light_of_lamps(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) -> Option<Arriving> {
         let world = self.tracer.world;
-        let sample = world.lights.sample(world, &vertex.receiver(), bits)?;
+        let point_at = |hit: &Hit, direction| world.point(hit, direction);
+        let receiver = vertex.receiver();
+        let sample = world.lights.sample(&world.scene, &receiver, bits, point_at)?;
         let (f, own_pdf) = vertex.scatterer.scattered(sample.direction)?;
         let is_punctual = sample.pdf_solid_angle.is_infinite();
         let light = match self.sight(vertex, sample.direction, sample.distance) {
@@ -113,9 +115,8 @@ impl Path<'_> {
                 if emitted == Vec3::ZERO {
                     return None;
                 }
-                let receiver = Some(&vertex.receiver());
                 let straight =
-                    GlassWalk::new(self.tracer, endless, body, Course::Straight, receiver);
+                    GlassWalk::new(self.tracer, endless, body, Course::Straight, Some(&receiver));
                 self.rays += straight.rays;
                 // Where it is found through an edge, rounding may lose the one that was chosen.
                 emitted / (straight.lamp_pdf.max(sample.pdf_solid_angle) + own_pdf)

@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::World;
 use super::light_tree::{Light, LightTree, Moments, Receiver};
 use crate::bsdf;
 use crate::bvh::Hit;
@@ -91,14 +90,15 @@ impl LocalLights {
         self.triangles.len()
     }
 
-    /// Samples a light as seen from a place. `None` where it does not shine that way.
-    pub fn sample(
+    /// Samples a light as seen from a place. `None` where it does not shine that way. `point_at` knows the surface
+    /// that a ray along a direction has hit.
+    pub fn sample<'a>(
         &self,
-        world: &World,
+        scene: &'a Scene,
         receiver: &Receiver,
         bits: [u32; 2],
+        point_at: impl FnOnce(&Hit, Vec3) -> SurfacePoint<'a>,
     ) -> Option<LightSample> {
-        let scene = &world.scene;
         let choice = self.tree.sample(receiver, bits[0]);
         let probability = choice.probability;
         let Some(&triangle) = self.triangles.get(choice.light as usize) else {
@@ -116,7 +116,7 @@ impl LocalLights {
         let direction = to_light / distance;
         let pdf_solid_angle =
             probability * area_to_solid_angle(&corners, direction, distance * distance)?;
-        let point = world.point(&Hit { t: distance, triangle, barycentric }, direction);
+        let point = point_at(&Hit { t: distance, triangle, barycentric }, direction);
         let radiance = emitted(scene, &point, -direction);
         (radiance.max_element() > 0.0).then(|| LightSample {
             direction,

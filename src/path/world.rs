@@ -5,7 +5,7 @@ use glam::Vec3;
 use std::sync::Arc;
 
 use super::lights::LocalLights;
-use super::materials::ReadyMaterial;
+use super::materials::{Passing, ReadyMaterial};
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray, Shared};
 use crate::environment::Environment;
@@ -42,10 +42,13 @@ impl World {
         let instances = scene.instances.for_tree();
         let shared = Shared { meshes: scene.instances.meshes(), instances: &instances };
         let bvh = Bvh::with_instances(&scene.positions, &scene.triangles, shared);
+        Self::of_geometry(scene, bvh, Arc::default())
+    }
+
+    fn of_geometry(scene: Scene, bvh: Bvh, geometry: Arc<()>) -> Self {
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
-        let (needs, geometry) = (SceneNeeds::of(&scene), Arc::default());
-        Self { needs, scene, bvh, lights, materials, geometry, clock: None }
+        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, geometry, clock: None }
     }
 
     /// The same scene with other materials, as many as it has, and other lights.
@@ -58,13 +61,8 @@ impl World {
         lights: Vec<PunctualLight>,
     ) -> Decoded<Self> {
         memory::check(self.memory_bytes())?;
-        let scene = Scene { materials, lights, ..self.scene.clone() };
-        let ready = scene.materials.iter().map(ReadyMaterial::new).collect();
-        let lights = LocalLights::new(&scene, self.bvh.bounds());
-        let (needs, bvh) = (SceneNeeds::of(&scene), self.bvh.clone());
-        let scene = with_huge_pages(scene);
-        let geometry = Arc::clone(&self.geometry);
-        Ok(Self { needs, scene, bvh, lights, materials: ready, geometry, clock: None })
+        let scene = with_huge_pages(Scene { materials, lights, ..self.scene.clone() });
+        Ok(Self::of_geometry(scene, self.bvh.clone(), Arc::clone(&self.geometry)))
     }
 
     /// Whether rays meet the same in both worlds, and as much light gets through: they were made of one
@@ -140,37 +138,30 @@ impl World {
     /// Share of light that arrives along a shadow ray: zero if a surface scatters it all.
     pub fn transmittance(&self, ray: &Ray) -> Vec3 {
         let _running = self.clock.as_ref().map(RayClock::start);
-        let mut transmittance = Vec3::ONE;
-        let blocked = if self.needs.features.pass_through() {
-            self.bvh.any_hit(ray, |hit| {
-                if self.is_backed(hit, ray) {
-                    return false;
-                }
-                if !self.material_of(hit).passing.partial {
-                    return self.is_covered(hit);
-                }
-                let point = self.point(hit, ray.direction);
-                transmittance *= self.straight_through(&point, ray.direction);
-                transmittance.max_element() <= 0.0
-            })
-        } else {
-            self.bvh.any_hit(ray, |_| true)
-        };
-        if blocked { Vec3::ZERO } else { transmittance }
+        if self.needs.features.pass_through() {
+            return self.transmittance_but_for(ray, |_| false);
+        }
+        if self.bvh.any_hit(ray, |_| true) { Vec3::ZERO } else { Vec3::ONE }
     }
 
     /// The same as if there were no smooth solid glass, and whether there is any.
     pub(crate) fn transmittance_but_for_glass(&self, ray: &Ray) -> (Vec3, bool) {
         let _running = self.clock.as_ref().map(RayClock::start);
-        let mut transmittance = Vec3::ONE;
         let mut meets_glass = false;
+        let transmittance = self.transmittance_but_for(ray, |passing| {
+            meets_glass |= passing.clear;
+            passing.clear
+        });
+        (transmittance, meets_glass)
+    }
+
+    /// The same as if surfaces that `skips` names were not there.
+    #[inline(always)]
+    fn transmittance_but_for(&self, ray: &Ray, mut skips: impl FnMut(&Passing) -> bool) -> Vec3 {
+        let mut transmittance = Vec3::ONE;
         let blocked = self.bvh.any_hit(ray, |hit| {
-            let passing = self.material_of(hit).passing;
-            if passing.clear {
-                meets_glass = true;
-                return false;
-            }
-            if self.is_backed(hit, ray) {
+            let passing = &self.material_of(hit).passing;
+            if skips(passing) || self.is_backed(hit, ray) {
                 return false;
             }
             if !passing.partial {
@@ -180,7 +171,7 @@ impl World {
             transmittance *= self.straight_through(&point, ray.direction);
             transmittance.max_element() <= 0.0
         });
-        (if blocked { Vec3::ZERO } else { transmittance }, meets_glass)
+        if blocked { Vec3::ZERO } else { transmittance }
     }
 
     /// The surface that a ray along `direction` has hit.

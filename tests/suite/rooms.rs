@@ -73,8 +73,7 @@ const MAX_METHODS: usize = 40;
 const LARGE_TYPES: [(&str, usize); 0] = [];
 
 /// Files that use each other in a circle. The list is to become shorter.
-const IN_CIRCLES: &[&str] =
-    &["path/light_tree", "path/light_tree/build", "path/lights", "path/world"];
+const IN_CIRCLES: &[&str] = &["path/light_tree", "path/light_tree/build"];
 
 /// Files that use an item that the module above them declares. The list is to become shorter.
 const USE_THEIR_PARENT: &[&str] = &["path/light_tree/build"];
@@ -105,7 +104,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("noise", 79),
     ("out_of_memory", 78),
     ("output", 604),
-    ("path", 2878),
+    ("path", 2866),
     ("prefetch", 14),
     ("radiance_cache", 327),
     ("render", 6483),

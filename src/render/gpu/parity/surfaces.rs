@@ -189,7 +189,9 @@ fn lights(fixture: &Fixture) -> Vec<Probe<'_>> {
             }),
             move |t| {
                 let receiver = take_receiver(t);
-                match world.lights.sample(world, &receiver, [t.take_word(), t.take_word()]) {
+                let (bits, point_at) =
+                    ([t.take_word(), t.take_word()], |hit: &_, v| world.point(hit, v));
+                match world.lights.sample(scene, &receiver, bits, point_at) {
                     Some(light) => {
                         let largest = light.radiance_over_pdf.max_element();
                         t.near(light.radiance_over_pdf, ulps(512.0).of(largest));
