@@ -1,4 +1,5 @@
-// Chooses a light by how much of its light may reach a place: twin of src/path/light_tree/mod.rs.
+// Chooses a light by how much of its light may reach a place: twin of src/path/light_tree/mod.rs and
+// of node.rs beside it.
 // `light_nodes` holds its nodes, three texels each; `lights` holds the emissive triangles
 // (ascending), the node of each, the distant lights (share and light) and the punctual lights.
 

@@ -2,57 +2,13 @@
 
 use glam::Vec3;
 
-use super::{LEAF, Node};
+use super::node::{LEAF, Moments, Node};
 
 /// Places along each axis between which a split is looked for.
 const BINS: usize = 16;
 
 /// Depth from which lights are halved by count, wherever they are: no input makes a deep tree.
 const HALVED_FROM_DEPTH: u32 = 64;
-
-/// Where lights are and where they shine: means over some of them, weighted by intensity.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super) struct Moments {
-    /// Largest radiant intensity of each light, summed; any unit, positive.
-    pub(in super::super) intensity: f32,
-    /// Mean position in metres.
-    pub(in super::super) center: Vec3,
-    /// Mean squared distance from there in square metres.
-    pub(in super::super) variance: f32,
-    /// Mean unit axis of the lights that shine as a Lambertian surface does, around their normals;
-    /// the others count as zero.
-    pub(in super::super) axis: Vec3,
-    /// Share of those lights, in `[0,1]`.
-    pub(in super::super) aimed: f32,
-    /// Mean intensity of the others in every direction, over [`Self::intensity`].
-    pub(in super::super) around: f32,
-}
-
-impl Moments {
-    /// Those of both.
-    fn with(&self, other: &Self) -> Self {
-        let intensity = self.intensity + other.intensity;
-        let share = other.intensity / intensity;
-        let between = other.center - self.center;
-        let mix = |a: f32, b: f32| a + (b - a) * share;
-        Self {
-            intensity,
-            center: self.center + between * share,
-            variance: mix(self.variance, other.variance)
-                + share * (1.0 - share) * between.length_squared(),
-            axis: self.axis.lerp(other.axis, share),
-            aimed: mix(self.aimed, other.aimed),
-            around: mix(self.around, other.around),
-        }
-    }
-
-    /// How badly one node stands for these lights: their scatter in space. Least sums of it make
-    /// clusters (Ward, *Hierarchical Grouping to Optimize an Objective Function*, 1963); counting
-    /// the scatter of axes as well gained nothing.
-    fn cost(&self) -> f32 {
-        self.intensity * self.variance
-    }
-}
 
 /// A light to be put into the tree.
 #[derive(Debug, Clone, Copy)]

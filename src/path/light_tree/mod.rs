@@ -8,53 +8,18 @@
 //! beforehand.
 
 mod build;
+mod node;
 
-use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
-
-pub(super) use build::{Light, Moments};
+pub(super) use build::Light;
+pub(super) use node::Moments;
+pub use node::Receiver;
+pub(crate) use node::{LEAF, MIN_COSINE, NEAREST_SQUARED, Node};
 
 use super::draw::{ALL, Draw, Interval, share_of};
-
-/// Bit of [`Node::link`] that marks a leaf.
-pub(crate) const LEAF: u32 = 1 << 31;
-
-/// Least cosine that lights are counted with: some of them shine where the mean does not.
-pub(crate) const MIN_COSINE: f32 = 1.0 / 64.0;
-
-/// Squared distance in square metres below which lights are not nearer: keeps importance finite.
-pub(crate) const NEAREST_SQUARED: f32 = 1e-20;
 
 /// Both the lights with a place and those without get at least an eighth of the samples, if there
 /// are any: power does not know which of them are seen.
 const MIN_SHARE: f64 = 1.0 / 8.0;
-
-/// A place at which light is gathered.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Receiver {
-    /// World position in metres.
-    pub position: Vec3,
-    /// Unit normal on the side from which light is scattered; zero if that is all around.
-    pub normal: Vec3,
-}
-
-/// Moments of the lights below, of a single light at a leaf.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Node {
-    center: Vec3,
-    variance: f32,
-    axis: Vec3,
-    /// Relative to that of all lights.
-    intensity: f32,
-    /// Squared share of the aimed lights.
-    aimed_squared: f32,
-    /// Squared length of `axis`.
-    axis_squared: f32,
-    around: f32,
-    /// The second child (the first one is the next node), or [`LEAF`] and a light.
-    link: u32,
-}
 
 /// A light without a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,45 +135,10 @@ fn distant_shares(distant: &[(u32, f64)], power: Option<f64>) -> Vec<DistantLigh
     shares
 }
 
-impl Node {
-    fn new(moments: &Moments, link: u32) -> Self {
-        let Moments { intensity, center, variance, axis, aimed, around } = *moments;
-        let (aimed_squared, axis_squared) = (aimed * aimed, axis.length_squared());
-        Self { center, variance, axis, intensity, aimed_squared, axis_squared, around, link }
-    }
-
-    /// About the irradiance that the lights cause at a place, in any unit; positive.
-    ///
-    /// Squared distances have a mean of that of the centre and the variance. So the vector to the
-    /// centre, divided by the root of it, is the shorter the less the lights have one direction, as
-    /// is the mean axis; cosines from them are uncertain by what they lack of length one.
-    fn importance(&self, receiver: &Receiver) -> f32 {
-        let to_lights = self.center - receiver.position;
-        let squared = (to_lights.length_squared() + self.variance).max(NEAREST_SQUARED);
-        let inverse = 1.0 / squared.sqrt();
-        let direction = to_lights * inverse;
-        let inverse_squared = inverse * inverse;
-        let scatter = self.variance * inverse_squared;
-        let known = self.axis_squared * (1.0 - scatter);
-        let aimed = clamped_mean(-self.axis.dot(direction), self.aimed_squared - known);
-        let emitted = (self.around + aimed).max(MIN_COSINE);
-        let received = if receiver.normal == Vec3::ZERO {
-            1.0
-        } else {
-            clamped_mean(receiver.normal.dot(direction), scatter).max(MIN_COSINE)
-        };
-        self.intensity * emitted * received * inverse_squared
-    }
-}
-
-/// About the mean of cosines that are negative counted as zero: the cosine itself or zero where all
-/// are alike (`scatter` 0), and a quarter, as over the sphere, where they are any (`scatter` 1).
-fn clamped_mean(cosine: f32, scatter: f32) -> f32 {
-    0.5 * (cosine + (cosine * cosine + 0.25 * scatter.max(0.0)).sqrt())
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::metrics::hypothesis::chi_square_test;
     use crate::noise::Stream;
