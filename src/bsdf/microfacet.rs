@@ -15,8 +15,8 @@ pub(crate) const SMOOTH_ALPHA: f32 = 1e-3;
 /// GGX of one width, or of two across each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ggx {
-    /// Across `axis`; not above `along`.
-    alpha: f32,
+    /// Width across `axis`; not above `along`.
+    pub(crate) alpha: f32,
     along: f32,
     /// Unit direction in the surface that `along` lies in.
     axis: Vec2,
@@ -40,11 +40,6 @@ impl Ggx {
             return ggx;
         }
         Self { alpha: ggx.alpha.max(SMOOTH_ALPHA), along, axis }
-    }
-
-    /// Width across the direction in which it is stretched.
-    pub(crate) fn alpha(self) -> f32 {
-        self.alpha
     }
 
     /// Whether this is a perfect mirror rather than a lobe.

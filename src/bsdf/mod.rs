@@ -54,8 +54,8 @@ pub struct Bsdf {
     rescatter: Option<Rescatter>,
     sheen: Sheen,
     coat: Coat,
-    /// There is nothing but Lambert's reflection: what most walls are, and cheap.
-    is_lambert: bool,
+    /// Whether there is nothing but Lambert's reflection: what most walls are, and cheap.
+    pub(crate) is_lambert: bool,
     /// Which part of it this is.
     weights: LobeWeights,
 }
@@ -63,7 +63,8 @@ pub struct Bsdf {
 /// The scattering towards one direction: what depends on that alone is known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ViewedBsdf<'a> {
-    bsdf: &'a Bsdf,
+    /// The scattering towards everywhere.
+    pub(crate) bsdf: &'a Bsdf,
     wo: Vec3,
     /// `None` if nothing is scattered there; Lambert's needs none.
     out: Option<Outgoing>,
@@ -135,11 +136,6 @@ impl Bsdf {
         self.viewed_from(wo).eval_pdf(wi)
     }
 
-    /// Whether what is scattered looks the same from everywhere in front.
-    pub(crate) fn is_lambert(&self) -> bool {
-        self.is_lambert
-    }
-
     /// Whether reflections are no narrower than GGX makes them with this alpha.
     pub(crate) fn is_broad(&self, min_alpha: f32) -> bool {
         self.narrow_lobes(min_alpha) == [false; 2]
@@ -149,8 +145,8 @@ impl Bsdf {
     fn narrow_lobes(&self, min_alpha: f32) -> [bool; 2] {
         let Self { coat, interface, weights, .. } = self;
         [
-            weights.coat > 0.0 && !coat.is_absent() && coat.ggx.alpha() < min_alpha,
-            weights.interface > 0.0 && !interface.is_absent() && interface.ggx.alpha() < min_alpha,
+            weights.coat > 0.0 && !coat.is_absent() && coat.ggx.alpha < min_alpha,
+            weights.interface > 0.0 && !interface.is_absent() && interface.ggx.alpha < min_alpha,
         ]
     }
 
@@ -335,11 +331,6 @@ impl Bsdf {
 }
 
 impl<'a> ViewedBsdf<'a> {
-    /// The scattering towards everywhere.
-    pub(crate) fn bsdf(&self) -> &'a Bsdf {
-        self.bsdf
-    }
-
     /// Shares of light that its interface, if it is smooth, reflects and transmits, linear RGB in `[0,1]`.
     pub(crate) fn smooth_shares(&self) -> [Vec3; 2] {
         self.bsdf.interface.smooth_shares(self.wo.z.abs())

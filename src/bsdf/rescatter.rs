@@ -162,7 +162,7 @@ impl Loss {
             Albedo::Mirrors(terms) => (1.0 - terms.at(v).element_sum()).max(0.0),
             Albedo::Refracts(ggx, eta) => {
                 let roughness =
-                    if ggx.is_stretched() { ggx.roughness_towards(v) } else { ggx.alpha().sqrt() };
+                    if ggx.is_stretched() { ggx.roughness_towards(v) } else { ggx.alpha.sqrt() };
                 glass_loss_at(eta, roughness, v.z.clamp(0.0, 1.0).sqrt() * LAST)
             }
         }

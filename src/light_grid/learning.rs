@@ -4,7 +4,7 @@ use super::cells::SphericalGrid;
 use super::counters::Counters;
 use super::distribution_builder::DistributionBuilder;
 use super::grid::{Cells, LightGrid, WHOLE_MAP};
-use super::options::{DistributionOptions, Recording};
+use super::options::DistributionOptions;
 use crate::environment::Environment;
 
 /// A grid with its learning counters: records while paths are traced, then becomes a [`LightGrid`].
@@ -14,7 +14,8 @@ pub struct LearningGrid {
     pub grid: SphericalGrid,
     /// The counters of its cells.
     pub counters: Counters,
-    options: DistributionOptions,
+    /// How paths record, and how distributions are built.
+    pub options: DistributionOptions,
     /// Number of times that distributions were built.
     generation: u32,
 }
@@ -35,16 +36,6 @@ impl LearningGrid {
             options,
             generation: 0,
         }
-    }
-
-    /// The kind of weight that a record must have.
-    pub fn recording(&self) -> Recording {
-        self.options.recording
-    }
-
-    /// Samples of the map that each vertex of a learning path tries.
-    pub fn tries_per_vertex(&self) -> u32 {
-        self.options.tries_per_vertex
     }
 
     /// Whether both grids count the same kind of weight in grids of the same shape; centres may differ.

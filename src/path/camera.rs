@@ -8,7 +8,8 @@ use crate::scene::{Camera, Projection};
 /// A camera made ready for a picture of one size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraRays {
-    pub(crate) position: Vec3,
+    /// Where the camera is.
+    pub position: Vec3,
     pub(crate) right: Vec3,
     pub(crate) up: Vec3,
     /// To the middle of the picture at distance 1; not a unit vector where that is off the axis.
@@ -60,11 +61,6 @@ impl CameraRays {
         self.half_extent *= size / self.picture_size;
         self.picture_size = size;
         self
-    }
-
-    /// Where the camera is.
-    pub fn position(&self) -> Vec3 {
-        self.position
     }
 
     /// Whether [`Self::ray`] uses its second pair of random numbers.

@@ -19,7 +19,7 @@ impl PathTracer<'_> {
     /// has learned so far: a tile's visibility ratio does not depend on how often it is tried.
     /// Returns the number of rays.
     pub fn learn(&self, ray: Ray, sampler: Sampler) -> u32 {
-        let tries = self.counts.map_or(0, LearningGrid::tries_per_vertex);
+        let tries = self.counts.map_or(0, |learning| learning.options.tries_per_vertex);
         let mut path = Path::new(self, ray, sampler);
         let mut own_bsdf = None;
         while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
@@ -77,13 +77,13 @@ impl Path<'_> {
             // What the cosine is to a surface: the phase function over that of even scattering.
             Scatterer::Medium(_) => 4.0 * std::f32::consts::PI * own_pdf,
         };
-        luminance(transmittance) * share.powi(learning.recording().cosine_power())
+        luminance(transmittance) * share.powi(learning.options.recording.cosine_power())
     }
 
     /// Samples the map to see what is visible of it.
     fn look_at_map(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) {
         let (Some(grid), Some(learning)) = (self.tracer.grid, self.tracer.counts) else { return };
-        let is_ratio = learning.recording().is_ratio();
+        let is_ratio = learning.options.recording.is_ratio();
         let whole_map_share = if is_ratio { 128 } else { 256 };
         let choice = grid.sample_sharing(vertex.distribution, bits, whole_map_share);
         self.expect_count(vertex, choice.tile);

@@ -101,11 +101,6 @@ impl Path<'_> {
 }
 
 impl Departure {
-    /// Whether NEE finds nothing in the direction of departure, for more than glass is in the way.
-    pub(super) fn is_blocked(&self, tracer: &PathTracer<'_>) -> bool {
-        tracer.world.transmittance_but_for_glass(&self.ray).0 == Vec3::ZERO
-    }
-
     /// Sums the densities with which NEE chooses emissive triangles behind glass in the direction of departure.
     pub(super) fn straight_walk(&self, tracer: &PathTracer<'_>) -> GlassWalk {
         GlassWalk::new(tracer, self.ray, Body::AIR, Course::Straight, Some(&self.receiver))

@@ -387,7 +387,7 @@ impl<'v> Outgoing<'v> {
         let reflected = |i: &Incident| upward.eval(i.wi) * i.light;
         let radiance: Vec3 = incident.iter().map(reflected).sum();
         match bsdf.left(Vec3::Z) {
-            _ if bsdf.is_lambert() => Self::Lambert(radiance),
+            _ if bsdf.is_lambert => Self::Lambert(radiance),
             left if left > 0.0 => Self::Body(surface, radiance / left),
             _ => Self::Directed(surface, incident),
         }

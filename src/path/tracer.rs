@@ -502,7 +502,8 @@ impl<'a> Path<'a> {
         if from.is_refracted {
             radiance = environment.radiance(self.ray.direction);
             self.rays += 1;
-            if from.is_blocked(self.tracer) {
+            // More than glass is in the way.
+            if self.tracer.world.transmittance_but_for_glass(&from.ray).0 == Vec3::ZERO {
                 nee = 0.0;
             }
         }
@@ -518,7 +519,7 @@ impl<'a> Path<'a> {
     pub(super) fn choose_onward(&mut self, vertex: &Vertex<'_>) -> Option<Onward> {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => {
-                let lobe = if surface.bsdf().is_lambert() {
+                let lobe = if surface.bsdf().is_lambert {
                     self.sampler.skip(1);
                     0.0
                 } else {

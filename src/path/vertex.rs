@@ -123,7 +123,7 @@ impl MediumScatterer {
 impl<'v> SurfaceScatterer<'v> {
     /// The scattering towards everywhere.
     pub(super) fn bsdf(&self) -> &'v Bsdf {
-        self.bsdf.bsdf()
+        self.bsdf.bsdf
     }
 
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is

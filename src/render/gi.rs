@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::view::{Gi, View};
 use super::view_probe::middle_distance;
 use crate::path::Lit;
-use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
+use crate::radiance_cache::{CacheCells, MAX_PATHS, RadianceCache, RadianceSums};
 
 /// One training path for this many paths rendered; it takes about twice as long as one of them. With half as many,
 /// means of 8x8 pixels have a quarter more error after as long, with twice as many pixels are worse.
@@ -24,7 +24,8 @@ const EDGE: f32 = 0.025;
 
 /// A radiance cache in the making. It outlives the picture, for it lies in the world.
 pub(crate) struct CacheTraining {
-    sums: RadianceSums,
+    /// What paths are added to.
+    pub(crate) sums: RadianceSums,
     /// The first path of those that have trained it: what bounds them was found by others.
     first: u64,
     /// How many have, and how many are to have before the next pass.
@@ -47,7 +48,7 @@ impl CacheTraining {
         if brightest <= 0.0 {
             return None;
         }
-        let center = view.rays().position();
+        let center = view.rays().position;
         let cells = CacheCells { center, edge, least_distance: 0.5 * distance };
         let sums = RadianceSums::new(cells, brightest);
         Some(Self { sums, first: 0, paths: 0, wanted: 0, cache: None, brightest })
@@ -76,11 +77,6 @@ impl CacheTraining {
 
     fn end(&self) -> u64 {
         if self.cache.is_none() { PILOT_PATHS } else { self.wanted }
-    }
-
-    /// What they are added to.
-    pub(super) fn sums(&self) -> &RadianceSums {
-        &self.sums
     }
 
     /// Takes note that paths up to this one of [`Self::next`] have trained. After the last of them there is a new cache; if
@@ -114,12 +110,7 @@ impl CacheTraining {
         position.distance(cells.center) < cells.least_distance
     }
 
-    /// What is known by now of each cell.
-    pub(crate) fn facts(&self) -> Option<CacheFacts> {
-        self.sums.facts()
-    }
-
-    /// Tells what [`Self::facts`] are of: paths that have trained it, and edge of the smallest cells.
+    /// Tells what the sums are of: paths that have trained it, and edge of the smallest cells.
     pub(crate) fn state(&self) -> (u64, f32) {
         (self.paths, self.sums.cells.edge)
     }
@@ -183,9 +174,9 @@ pub(super) mod tests {
         let mut known: Vec<Vec<f32>> = Vec::new();
         let mut start = 0;
         for end in [1 << 12, 1 << 17, 1 << 20] {
-            cpu::train(&tracer, &view, start..end, training.sums());
+            cpu::train(&tracer, &view, start..end, &training.sums);
             start = end;
-            let cache = training.sums().cache().expect("there is room");
+            let cache = training.sums.cache().expect("there is room");
             let radiance = |(position, normal): &(Vec3, Vec3)| {
                 crate::color::luminance(cache.radiance_over_albedo(*position, *normal))
             };
@@ -216,7 +207,7 @@ pub(super) mod tests {
             // In a square so large that the smallest cells do not suffice for it.
             for place in 4 * range.start..4 * range.end {
                 let [x, z] = [place % 256, place / 256].map(|at| at as f32 * 0.02 * edge);
-                let sums = training.sums();
+                let sums = &training.sums;
                 sums.add(sums.cells.center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
                 places += 1;
             }

@@ -69,7 +69,7 @@ impl Inspection {
         if let Some((_, facts)) = self.cache.as_ref().filter(|(of, _)| *of == state) {
             return Ok(Arc::clone(facts));
         }
-        let facts = Arc::new(training.facts().ok_or(missing)?);
+        let facts = Arc::new(training.sums.facts().ok_or(missing)?);
         self.cache = Some((state, Arc::clone(&facts)));
         Ok(facts)
     }

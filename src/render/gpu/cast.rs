@@ -64,7 +64,7 @@ impl Caster {
     pub(crate) fn cast(&mut self, question: Question, count: u32) -> Result<f64> {
         let kernel = question.kernel();
         self.0.settle()?;
-        let before = self.0.flights.figures().device_seconds;
+        let before = self.0.flights.figures.device_seconds;
         let mut first = 0;
         while first < count {
             let groups = self.0.flights.units(kernel).min(MAX_GROUPS);
@@ -74,7 +74,7 @@ impl Caster {
             first += groups * GROUP as u32;
         }
         self.0.settle()?;
-        Ok(self.0.flights.figures().device_seconds - before)
+        Ok(self.0.flights.figures.device_seconds - before)
     }
 
     /// What came of each of the first `count` rays: the distance (`f32::MAX` without a hit) and the

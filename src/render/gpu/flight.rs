@@ -38,7 +38,8 @@ pub(super) struct Flights {
     /// What the last job to land that reports has reported.
     pub(super) report: Option<[u32; 4]>,
     started: usize,
-    figures: FlightFigures,
+    /// What the dispatches so far took.
+    pub(super) figures: FlightFigures,
 }
 
 /// What a submission does.
@@ -89,11 +90,6 @@ impl Flights {
     /// Lets dispatches of a kernel begin with what other pictures know of its speed.
     pub(super) fn resume(&mut self, kernel: Kernel, last: &LastUnits) {
         self.pacers[kernel as usize].resume(last);
-    }
-
-    /// What the dispatches so far took.
-    pub(super) fn figures(&self) -> FlightFigures {
-        self.figures
     }
 
     /// Submits a job, once there is room for it.

@@ -43,7 +43,7 @@ pub(super) fn trace_anywhere(
 /// Uploads counters, to be counted on.
 pub(super) fn put_counters(on: &mut Dispatcher, learning: &LearningGrid) -> Result<()> {
     on.globals.set_cells(&learning.grid);
-    on.globals.tries_per_vertex = learning.tries_per_vertex();
+    on.globals.tries_per_vertex = learning.options.tries_per_vertex;
     on.write_globals();
     let (visits, slots, mut blocks) = learning.counters.words();
     if blocks.is_empty() {
@@ -188,20 +188,20 @@ pub(super) mod tests {
                 &PathTracer { cache: known.as_ref(), ..tracer },
                 &view,
                 paths.clone(),
-                on_cpu.sums(),
+                &on_cpu.sums,
             );
             renderer.set_cache(known.as_ref()).expect("uploaded");
             let (end, gpu_rays) =
-                renderer.train(paths.clone(), on_gpu.sums(), &never).expect("trained");
+                renderer.train(paths.clone(), &on_gpu.sums, &never).expect("trained");
             assert_eq!(end, paths.end);
             assert!(cpu_rays.abs_diff(gpu_rays) * 500 < cpu_rays, "{cpu_rays} {gpu_rays}");
-            let totals = [&on_cpu, &on_gpu].map(|training| training.sums().totals());
+            let totals = [&on_cpu, &on_gpu].map(|training| training.sums.totals());
             let [(cpu_count, cpu_sums), (gpu_count, gpu_sums)] = totals;
             eprintln!("{cpu_count} {cpu_sums} against {gpu_count} {gpu_sums}");
             assert!(cpu_count.abs_diff(gpu_count) * 500 < cpu_count);
             assert!((cpu_sums / gpu_sums - 1.0).abs().max_element() < 0.01);
-            known = on_cpu.sums().cache();
-            let found = on_gpu.sums().cache().expect("there is room").used_slots();
+            known = on_cpu.sums.cache();
+            let found = on_gpu.sums.cache().expect("there is room").used_slots();
             let slots = known.as_ref().map_or(0, RadianceCache::used_slots);
             assert!(slots.abs_diff(found) * 200 < slots, "{slots} {found}");
         }

@@ -356,7 +356,7 @@ impl Renderer {
             adapter: on.gpu.facts().clone(),
             device_bytes: on.buffers.bytes(),
             bytes_read: on.buffers.bytes_read(),
-            flights: on.flights.figures(),
+            flights: on.flights.figures,
             compile_seconds: on.compile_seconds,
             schedule: if is_queue { Schedule::Queue } else { Schedule::Whole },
             kernel: self.kernel_facts.clone(),

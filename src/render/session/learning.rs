@@ -62,7 +62,7 @@ impl Learning {
             return None;
         }
         let grid = SphericalGrid {
-            center: view.rays().position(),
+            center: view.rays().position,
             columns: view.grid_columns,
             rows: (view.grid_columns / 2).max(1),
             faces: options.faces,
@@ -146,7 +146,7 @@ impl Tiles {
     ) -> bool {
         let goes_on = view.distribution_options().is_some_and(|options| options.goes_on());
         let Some(learning) = self.learning.as_mut().filter(|_| goes_on) else { return false };
-        let moved = view.rays().position().distance(counted.grid.center);
+        let moved = view.rays().position.distance(counted.grid.center);
         let is_near =
             middle_distance(world, view).is_some_and(|distance| moved <= MAX_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {

@@ -430,7 +430,7 @@ impl<'a> Session<'a> {
             && let Some(paths) = training.next()
             && !cancel.load(Ordering::Relaxed)
         {
-            let sums = training.sums();
+            let sums = &training.sums;
             let (done, rays) = match &mut self.gpu {
                 None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);

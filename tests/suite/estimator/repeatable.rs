@@ -107,7 +107,7 @@ fn counters_do_not_depend_on_the_threads() {
     let whole_map = LightGrid::whole_map(energies).expect("a map with light");
     let counted = |threads| {
         let grid = SphericalGrid {
-            center: rays.position(),
+            center: rays.position,
             columns: 64,
             rows: 32,
             faces: true,

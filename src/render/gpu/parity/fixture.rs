@@ -56,7 +56,7 @@ pub(super) fn all() -> [Fixture; 7] {
         let energies = environment.tile_energies();
         let faces = sampling == Adaptive;
         let cells = SphericalGrid {
-            center: rays.position(),
+            center: rays.position,
             columns: 64,
             rows: 32,
             faces,

@@ -271,7 +271,7 @@ pub(super) fn camera(fixture: &Fixture) -> Vec<Probe<'_>> {
     let Fixture { view, rays, .. } = fixture;
     let size = Vec2::new(view.width as f32, view.height as f32);
     let corners = [Vec2::ZERO, size, 0.5 * size].map(|p| case(&[&p, &Vec2::splat(0.5)]));
-    let reach = rays.position().length() + rays.focus_distance;
+    let reach = rays.position.length() + rays.focus_distance;
     vec![
         Probe::new(
             "camera_ray",

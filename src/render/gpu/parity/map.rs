@@ -178,7 +178,7 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
 }
 
 fn cells(fixture: &Fixture) -> Vec<Probe<'_>> {
-    let center = fixture.rays.position();
+    let center = fixture.rays.position;
     let edge_points = move || {
         let around = edge_directions().into_iter().map(move |d| (center + 3.0 * d, d));
         around.chain([(center, Vec3::ONE), (Vec3::splat(1e30), Vec3::ZERO)])
