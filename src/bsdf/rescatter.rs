@@ -34,7 +34,7 @@ pub(crate) const MIN_LOSS: f32 = 1e-4;
 /// What white glass loses by index, roughness and square root of the cosine; the last of a row is its
 /// cosine-weighted mean.
 static LOSSES: LazyLock<Vec<[f32; NODES + 1]>> = LazyLock::new(|| {
-    let row = |row: usize| glass_row(index_of_node(row / NODES), (row % NODES) as f32 / LAST);
+    let row = |row: usize| glass_row(row / NODES, (row % NODES) as f32 / LAST);
     (0..INDICES * NODES).into_par_iter().map(row).collect()
 });
 const LAST: f32 = (NODES - 1) as f32;
@@ -216,12 +216,10 @@ fn split(x: f32, most: usize) -> (usize, f32) {
     (whole, x - whole as f32)
 }
 
-fn index_of_node(node: usize) -> f32 {
-    let z = (2.0 * node as f32 / (INDICES - 1) as f32 - 1.0) * MAX_INDEX;
-    (1.0 + z) / (1.0 - z)
-}
-
-fn glass_row(eta: f32, roughness: f32) -> [f32; NODES + 1] {
+/// The row of [`LOSSES`] at a node of the relative index, and a roughness.
+fn glass_row(index: usize, roughness: f32) -> [f32; NODES + 1] {
+    let z = (2.0 * index as f32 / (INDICES - 1) as f32 - 1.0) * MAX_INDEX;
+    let eta = (1.0 + z) / (1.0 - z);
     let ggx = Ggx::from_roughness(roughness);
     let mut row = [0.0; NODES + 1];
     for (i, entry) in row.iter_mut().take(NODES).enumerate() {

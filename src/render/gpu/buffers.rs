@@ -17,8 +17,6 @@ use crate::error::{Error, Result};
 pub(super) struct Buffers {
     pub(super) gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
-    /// Whether arrays lie in buffers, where they fit into one.
-    prefers_buffers: bool,
     arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
     /// The driver's tree of the scene, if rays are traced by the device's own queries.
     pub(super) tree: Option<wgpu::Tlas>,
@@ -42,7 +40,6 @@ impl Buffers {
         Self {
             gpu: gpu.clone(),
             by_name: BTreeMap::new(),
-            prefers_buffers: gpu.prefers_buffers,
             arrays: BTreeMap::new(),
             tree: None,
             width_log2,
@@ -60,7 +57,8 @@ impl Buffers {
     /// Where each array lies that is there, and where those will that are not.
     pub(super) fn array_places(&self) -> ArrayPlaces {
         let names = ARRAYS.into_iter().map(|kind| kind.name);
-        let in_buffers = names.filter(|name| self.prefers_buffers && self.array(name).is_none());
+        let in_buffers =
+            names.filter(|name| self.gpu.prefers_buffers && self.array(name).is_none());
         ArrayPlaces { width_log2: self.width_log2, in_buffers: in_buffers.collect() }
     }
 
@@ -119,7 +117,7 @@ impl Buffers {
         let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
         let bytes = texels * kind.format.bytes();
         // A kernel may have been made for distributions in a buffer.
-        if self.prefers_buffers && (bytes <= self.most_bytes() || name == "distributions") {
+        if self.gpu.prefers_buffers && (bytes <= self.most_bytes() || name == "distributions") {
             self.arrays.remove(name);
             // Never in place, for others may share the old one.
             self.make(name, bytes, what)?;

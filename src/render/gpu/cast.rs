@@ -70,7 +70,7 @@ impl Caster {
             let groups = self.0.flights.units(kernel).min(MAX_GROUPS);
             let groups = groups.min(u64::from(count - first).div_ceil(GROUP)) as u32;
             let work = Work { first, count, ..Work::default() };
-            self.0.dispatch(&[kernel], &work, groups, u64::from(groups))?;
+            self.0.dispatch(&[kernel], &work, (1, groups), u64::from(groups), None)?;
             first += groups * GROUP as u32;
         }
         self.0.settle()?;

@@ -55,7 +55,7 @@ impl Dispatcher {
         view: &View,
     ) -> Result<Self> {
         features::check(view)?;
-        let gpu = uploaded.gpu.clone();
+        let gpu = uploaded.buffers.gpu.clone();
         let mut features = Features::of(world, environment, view);
         features.kernel.set(KernelFeatures::HARDWARE_RAYS, gpu.has_hardware_rays());
         // GPUs may fuse products with sums.
@@ -174,19 +174,9 @@ impl Dispatcher {
         bound.current(gpu, buffers)
     }
 
-    /// Sets kernels going, one after another; by the first one's speed the work was sized.
+    /// Sets kernels going, one after another, `steps` times in one submission; by the first one's speed the work was
+    /// sized. Afterwards the first words of the buffer `report` are read.
     pub(super) fn dispatch(
-        &mut self,
-        order: &[Kernel],
-        work: &Work,
-        groups: u32,
-        units: u64,
-    ) -> Result<()> {
-        self.repeat(order, work, (1, groups), units, None)
-    }
-
-    /// [`Self::dispatch`] so many times in one submission, after which the first words of a buffer are read.
-    pub(super) fn repeat(
         &mut self,
         order: &[Kernel],
         work: &Work,

@@ -32,7 +32,7 @@ pub(super) fn trace_anywhere(
             ..Work::default()
         };
         let groups = count.div_ceil(GROUP);
-        on.dispatch(&[kernel], &work, groups as u32, groups)?;
+        on.dispatch(&[kernel], &work, (1, groups as u32), groups, None)?;
         first += count;
     }
     on.settle()?;

@@ -86,7 +86,7 @@ impl Queue {
             }
             let steps = (on.flights.units(Kernel::Trace) / self.groups).clamp(1, MAX_STEPS);
             let size = (steps as u32, self.groups as u32);
-            on.repeat(kernels(on.features), &work, size, self.groups * steps, Some("queue"))?;
+            on.dispatch(kernels(on.features), &work, size, self.groups * steps, Some("queue"))?;
         }
         self.forget_paths(on, progress)?;
         *progress = Progress::even(pass.target);

@@ -82,7 +82,7 @@ impl Sharing {
                     rounds: (count / busy_groups).clamp(1, MAX_ROUNDS) as u32,
                     ..Work::default()
                 };
-                on.dispatch(&Kernel::OF_SHARING, &work, count as u32, count)?;
+                on.dispatch(&Kernel::OF_SHARING, &work, (1, count as u32), count, None)?;
                 self.next_group = first + count;
                 let tiles = [first, self.next_group].map(|group| group * tiles_of_group(self.tile));
                 progress.surplus += tiling.pixels(tiles[0]..tiles[1]);

@@ -26,7 +26,6 @@ const PART: usize = 1 << 16;
 /// A scene and a map uploaded once for any number of views.
 #[derive(Clone)]
 pub struct UploadedScene {
-    pub(super) gpu: Gpu,
     pub(super) buffers: Buffers,
     pub(super) globals: Globals,
     pub(super) constants: Constants,
@@ -41,7 +40,6 @@ impl UploadedScene {
     /// If something does not fit on the device, with the numbers.
     pub fn new(gpu: &Gpu, world: &World, environment: &Environment) -> Result<Self> {
         let mut uploaded = Self {
-            gpu: gpu.clone(),
             buffers: Buffers::new(gpu),
             globals: Globals::default(),
             constants: Constants::default(),
@@ -77,8 +75,8 @@ impl UploadedScene {
         self.globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
         let flags_of =
             |triangle: u32| materials[scene.triangle_materials[triangle as usize] as usize].flags;
-        let stack_size = if self.gpu.has_hardware_rays() {
-            let tree = Acceleration::build(&self.gpu, world, flags_of)?;
+        let stack_size = if self.buffers.gpu.has_hardware_rays() {
+            let tree = Acceleration::build(&self.buffers.gpu, world, flags_of)?;
             self.globals.opaque_triangles = tree.opaque;
             self.put_instances(world, &tree.instances)?;
             let buffers = &mut self.buffers;

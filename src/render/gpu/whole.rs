@@ -46,7 +46,8 @@ pub(super) fn advance(
                 stride: pass.stride,
                 ..Work::default()
             };
-            on.dispatch(&[Kernel::Render], &work, count as u32, count * u64::from(samples))?;
+            let units = count * u64::from(samples);
+            on.dispatch(&[Kernel::Render], &work, (1, count as u32), units, None)?;
             progress.group_samples += samples;
         }
         *progress = Progress { tile: first + count, group: 0, group_samples: 0, ..*progress };

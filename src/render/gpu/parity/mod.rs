@@ -208,7 +208,7 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
     on.buffers.put("probe_answers", bytemuck::cast_slice(&untouched), "answers").expect("it fits");
     let count = probe.cases.len() as u32;
     let work = Work { first: index as u32, count, ..Work::default() };
-    on.dispatch(&[Kernel::Render], &work, count.div_ceil(64), 1).expect("it runs");
+    on.dispatch(&[Kernel::Render], &work, (1, count.div_ceil(64)), 1, None).expect("it runs");
     on.read_words("probe_answers", words.len()).expect("it can be read")
 }
 
