@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use super::choices::SceneArguments;
-use super::picture::{check_kept, say_written};
+use super::picture::{check_output, say_written};
 use super::progress::Progress;
 use super::{interrupt, render, values};
 use crate::bench::{Options, Subject, run as measure};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{At as _, Error, Result};
-use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
 use crate::render::Sharing;
@@ -70,8 +69,7 @@ pub(super) struct BenchArguments {
 /// Measures and prints.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     if let Some(file) = &arguments.json {
-        check_kept(file, arguments.scenes.iter().chain([&arguments.env]))?;
-        check_writable(file)?;
+        check_output(file, arguments.scenes.iter().chain([&arguments.env]))?;
     }
     if arguments.adapter.is_some() && arguments.device == [Device::Cpu] {
         return Err(Error::new("--adapter and --device cpu exclude each other"));

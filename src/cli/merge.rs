@@ -93,10 +93,8 @@ fn belonging_together(paths: &[PathBuf]) -> Result<Vec<(&Path, FilmFacts)>> {
         if let Some((first, of_first)) = parts.first() {
             let first = first.display();
             if let Some(difference) = facts.difference(&of_first.picture) {
-                return Err(Error::at(
-                    path,
-                    format!("does not belong to {first}: another {difference}"),
-                ));
+                let cause = format!("does not belong to {first}: another {difference}");
+                return Err(Error::at(path, cause));
             }
             if (facts.part.count, facts.samples) != (of_first.part.count, of_first.samples) {
                 let [this, others] = [facts.share(), of_first.share()];
@@ -104,10 +102,8 @@ fn belonging_together(paths: &[PathBuf]) -> Result<Vec<(&Path, FilmFacts)>> {
             }
         }
         if let Some((other, _)) = parts.iter().find(|(_, other)| other.part == facts.part) {
-            return Err(Error::at(
-                path,
-                format!("is part {}, and so is {}", facts.part, other.display()),
-            ));
+            let cause = format!("is part {}, and so is {}", facts.part, other.display());
+            return Err(Error::at(path, cause));
         }
         parts.push((path, facts));
     }

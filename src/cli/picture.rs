@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
-use crate::image::{Image, is_same_file, name_of_process};
+use crate::image::{Image, check_writable, is_same_file, name_of_process};
 use crate::output::{self, Exposure, Films, LayerName, LinearRgb, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
@@ -216,14 +216,14 @@ impl PictureArguments {
     }
 }
 
-/// Refuses to write over what is read, the names of scenes and maps.
-pub(super) fn check_kept<'a>(
+/// Refuses to write over what is `read`, the names of scenes and maps, and where no file can be written.
+pub(super) fn check_output<'a>(
     output: &Path,
     read: impl IntoIterator<Item = &'a String>,
 ) -> Result<()> {
     match read.into_iter().any(|other| is_same_file(Path::new(other), output)) {
         true => Err(Error::at(output, "would be written over the scene or the map")),
-        false => Ok(()),
+        false => check_writable(output),
     }
 }
 

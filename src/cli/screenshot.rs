@@ -7,7 +7,7 @@ use glam::Vec2;
 
 use super::camera::CameraArguments;
 use super::choices::SceneArguments;
-use super::picture::{check_kept, parse_exposure, say_written};
+use super::picture::{check_output, parse_exposure, say_written};
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, Light, Look};
@@ -15,7 +15,7 @@ use crate::app::interface::{Dock, Interface, Tab, TileView};
 use crate::app::overlays::Overlay;
 use crate::app::screenshot::{Shot, Studio};
 use crate::error::{Error, Result};
-use crate::image::{check_writable, write_png};
+use crate::image::write_png;
 use crate::output::Exposure;
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
@@ -135,8 +135,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(Error::at(path, "screenshots are written as .png"));
     }
-    check_kept(path, [&arguments.scene].into_iter().chain(&arguments.env))?;
-    check_writable(path)?;
+    check_output(path, [&arguments.scene].into_iter().chain(&arguments.env))?;
     let shows_cache = arguments.overlay.is_some_and(Overlay::is_of_cache);
     if shows_cache && (!arguments.denoise || arguments.split) {
         return Err(Error::new(

@@ -94,11 +94,10 @@ pub(super) fn frames(text: &str) -> Result<RangeInclusive<u32>, String> {
 
 /// `map`, `none`, `blur:DEGREES` or a colour.
 pub(super) fn background(text: &str) -> Result<Background, String> {
-    if text == "map" {
-        return Ok(Background::Map);
-    }
-    if text == "none" {
-        return Ok(Background::None);
+    match text {
+        "map" => return Ok(Background::Map),
+        "none" => return Ok(Background::None),
+        _ => {}
     }
     if let Some(degrees) = text.strip_prefix("blur:") {
         let degrees = finite(degrees)?;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::render_job::RenderJob;
 use super::{RenderArguments, frames};
-use crate::cli::picture::{check_kept, say_written};
+use crate::cli::picture::{check_output, say_written};
 use crate::error::{Error, Result};
-use crate::image::{check_writable, is_same_file};
+use crate::image::is_same_file;
 use crate::output::Films;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
@@ -51,8 +51,7 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
         }
-        check_kept(file, [&arguments.scene].into_iter().chain(&arguments.env))?;
-        check_writable(file)?;
+        check_output(file, [&arguments.scene].into_iter().chain(&arguments.env))?;
     }
     if arguments.part.is_none() {
         arguments.picture.say_unused(&arguments.outputs);
