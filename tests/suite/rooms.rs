@@ -76,7 +76,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("bench", 567),
     ("bsdf", 1476),
     ("bvh", 1421),
-    ("cli", 3438),
+    ("cli", 3421),
     ("color", 27),
     ("denoise", 1024),
     ("develop", 422),

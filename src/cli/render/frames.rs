@@ -59,18 +59,14 @@ impl<'a> Frames<'a> {
             }
         };
         let numbers = arguments.frames.clone().unwrap_or_else(|| all.clone());
-        if numbers.end() > all.end() {
+        let [first, last, end] = [numbers.start(), numbers.end(), all.end()];
+        if last > end {
+            let count = end + 1;
             return Err(Error::new(format!(
-                "--frames {}..{}: the last of a turn's {} is {}",
-                numbers.start(),
-                numbers.end(),
-                all.end() + 1,
-                all.end()
+                "--frames {first}..{last}: the last of a turn's {count} is {end}"
             )));
         }
-        if numbers.end() > numbers.start()
-            && (arguments.part.is_some() || arguments.checkpoint.is_some())
-        {
+        if last > first && (arguments.part.is_some() || arguments.checkpoint.is_some()) {
             return Err(Error::new("--part and --checkpoint are of one frame, such as --frames 3"));
         }
         Ok(Some(Self { numbers, motion, frames_per_second: arguments.fps }))
@@ -122,25 +118,14 @@ pub(super) fn is_video(path: &Path) -> bool {
 }
 
 /// What ffmpeg is told for a kind of video. Those of the first two have an even size.
-fn codec(path: &Path) -> Option<&'static [&'static str]> {
-    const EVEN: &str = "crop=trunc(iw/2)*2:trunc(ih/2)*2";
-    match extension(path)?.as_str() {
-        "mp4" => Some(&["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", EVEN]),
-        "webm" => Some(&[
-            "-c:v",
-            "libvpx-vp9",
-            "-crf",
-            "24",
-            "-b:v",
-            "0",
-            "-pix_fmt",
-            "yuv420p",
-            "-vf",
-            EVEN,
-        ]),
-        "gif" => Some(&["-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse"]),
-        _ => None,
-    }
+fn codec(path: &Path) -> Option<String> {
+    const EVEN: &str = "-pix_fmt yuv420p -vf crop=trunc(iw/2)*2:trunc(ih/2)*2";
+    Some(match extension(path)?.as_str() {
+        "mp4" => format!("-c:v libx264 -crf 16 {EVEN}"),
+        "webm" => format!("-c:v libvpx-vp9 -crf 24 -b:v 0 {EVEN}"),
+        "gif" => "-vf split[a][b];[a]palettegen[p];[b][p]paletteuse".to_owned(),
+        _ => return None,
+    })
 }
 
 /// Refuses names that cannot hold many pictures, and videos that nothing here can make.
@@ -154,13 +139,12 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         if !is_video(path) && !has_number {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             let extension = path.extension().unwrap_or_default().to_string_lossy();
-            return Err(Error::at(
-                path,
-                format!("frames need a number in their names, as {name}.####.{extension} has"),
-            ));
+            let cause =
+                format!("frames need a number in their names, as {name}.####.{extension} has");
+            return Err(Error::at(path, cause));
         }
         if let Some(codec) = codec(path) {
-            try_ffmpeg(codec).at(path)?;
+            try_ffmpeg(&codec).at(path)?;
         }
         if has_number && path.file_name().is_some_and(|name| name.to_str().is_none()) {
             return Err(Error::at(path, "its name is not Unicode: no number can be put into it"));
@@ -170,13 +154,13 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
 }
 
 /// Makes a video of one black frame and throws it away: hours of rendering are not to find that ffmpeg cannot.
-fn try_ffmpeg(codec: &[&str]) -> std::result::Result<(), String> {
+fn try_ffmpeg(codec: &str) -> std::result::Result<(), String> {
     const SIDE: usize = 64;
     let cannot = |cause: &dyn std::fmt::Display| format!("ffmpeg cannot make it: {cause}");
     let child = Command::new("ffmpeg")
         .args(["-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
         .args(["-s", &format!("{SIDE}x{SIDE}"), "-i", "-"])
-        .args(codec)
+        .args(codec.split_whitespace())
         .args(["-f", "null", "-"])
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
@@ -252,16 +236,15 @@ impl Reel {
         command
             .args(["-y", "-v", "error", "-framerate", &frames_per_second.to_string()])
             .args(["-i", "%08d.png"])
-            .args(codec(path).unwrap_or_default())
+            .args(codec(path).unwrap_or_default().split_whitespace())
             .arg(&made)
             // Names of folders may have what it would take for numbers.
             .current_dir(&self.folder)
             .stdin(Stdio::null());
         // Ctrl-C ends the rendering, not the video of what there is.
         set_apart(&mut command);
-        let output = command.output();
-        let output =
-            output.map_err(|e| Error::at(path, format!("ffmpeg cannot be started: {e}")))?;
+        let cannot = |e| Error::at(path, format!("ffmpeg cannot be started: {e}"));
+        let output = command.output().map_err(cannot)?;
         if !output.status.success() {
             return Err(Error::at(path, format!("ffmpeg failed: {}", said(&output.stderr))));
         }
