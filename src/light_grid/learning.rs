@@ -60,9 +60,8 @@ impl LearningGrid {
             .saturating_sub(self.counters.memory_bytes() + distribution_of_cell.len() * 2)
             .saturating_sub(result.distributions.memory_bytes());
         builder.build(room, &mut result.distributions, &mut distribution_of_cell);
-        result.whole_map_share = self.options.whole_map_share;
-        result.generation = self.generation;
-        result.cells = Some(Cells { grid: self.grid, distribution_of_cell });
-        Some(result)
+        let cells = Some(Cells { grid: self.grid, distribution_of_cell });
+        let (whole_map_share, generation) = (self.options.whole_map_share, self.generation);
+        Some(LightGrid { cells, whole_map_share, generation, ..result })
     }
 }

@@ -45,9 +45,7 @@ impl LightGrid {
             }
             cells
         });
-        result.whole_map_share = self.whole_map_share;
-        result.generation = self.generation;
-        Some(result)
+        Some(Self { whole_map_share: self.whole_map_share, generation: self.generation, ..result })
     }
 }
 

@@ -254,6 +254,52 @@ impl Path<'_> {
             && vertex.scatterer.is_alike_nearby()
             && vertex.scatterer.is_true_from(-self.ray.direction)
     }
+
+    /// Estimates what arrives at the vertex, `times` times over. Its perfect reflections, which no other
+    /// pixel sees, are none.
+    fn incident(&mut self, vertex: &Vertex<'_>, times: u32) -> Vec<Incident> {
+        let share = 1.0 / times as f32;
+        let mut incident = Vec::with_capacity(3 * times as usize);
+        let mut add = |direction: Vec3, light: Vec3| {
+            let (wi, agrees) = match &vertex.scatterer {
+                Scatterer::Surface(surface) => {
+                    let wi = surface.shading_frame.local_from_world(direction);
+                    (wi, (wi.z > 0.0) == surface.sides.is_above(direction))
+                }
+                Scatterer::Medium(_) => (direction, true),
+            };
+            if agrees && light != Vec3::ZERO {
+                incident.push(Incident { wi, light });
+            }
+        };
+        self.bounces += 1;
+        self.interfaces = 0;
+        self.rays = 0;
+        self.throughput_before *= self.throughput.max_element();
+        self.throughput = Vec3::ONE;
+        let arrived = self.clone();
+        for time in 0..times {
+            *self = Self { rays: self.rays, ..arrived.clone() };
+            self.sampler = arrived.sampler.of_estimate(times, time);
+            let lights = self.choose_lights(vertex);
+            let onward = self.choose_onward(vertex);
+            let mut take = |arriving: Arriving| add(arriving.direction, arriving.light * share);
+            self.for_arriving(vertex, &lights, &mut take);
+            if !onward.is_some_and(|onward| self.go_on(vertex, &onward)) {
+                continue;
+            }
+            let density = self.departure.pdf_solid_angle;
+            let direction = self.ray.direction;
+            let weight = self.throughput;
+            let Some(survival) = self.survival() else { continue };
+            self.throughput = Vec3::ONE;
+            self.throughput_before *= weight.max_element() / survival;
+            self.radiance = Vec3::ZERO;
+            self.run();
+            add(direction, self.radiance * (share / (survival * density)));
+        }
+        incident
+    }
 }
 
 impl SurfaceScatterer<'_> {
@@ -411,54 +457,6 @@ impl<'v> Outgoing<'v> {
                 incident.iter().map(|i| turned(i) * i.light).sum()
             }
         }
-    }
-}
-
-impl Path<'_> {
-    /// Estimates what arrives at the vertex, `times` times over. Its perfect reflections, which no other
-    /// pixel sees, are none.
-    fn incident(&mut self, vertex: &Vertex<'_>, times: u32) -> Vec<Incident> {
-        let share = 1.0 / times as f32;
-        let mut incident = Vec::with_capacity(3 * times as usize);
-        let mut add = |direction: Vec3, light: Vec3| {
-            let (wi, agrees) = match &vertex.scatterer {
-                Scatterer::Surface(surface) => {
-                    let wi = surface.shading_frame.local_from_world(direction);
-                    (wi, (wi.z > 0.0) == surface.sides.is_above(direction))
-                }
-                Scatterer::Medium(_) => (direction, true),
-            };
-            if agrees && light != Vec3::ZERO {
-                incident.push(Incident { wi, light });
-            }
-        };
-        self.bounces += 1;
-        self.interfaces = 0;
-        self.rays = 0;
-        self.throughput_before *= self.throughput.max_element();
-        self.throughput = Vec3::ONE;
-        let arrived = self.clone();
-        for time in 0..times {
-            *self = Self { rays: self.rays, ..arrived.clone() };
-            self.sampler = arrived.sampler.of_estimate(times, time);
-            let lights = self.choose_lights(vertex);
-            let onward = self.choose_onward(vertex);
-            let mut take = |arriving: Arriving| add(arriving.direction, arriving.light * share);
-            self.for_arriving(vertex, &lights, &mut take);
-            if !onward.is_some_and(|onward| self.go_on(vertex, &onward)) {
-                continue;
-            }
-            let density = self.departure.pdf_solid_angle;
-            let direction = self.ray.direction;
-            let weight = self.throughput;
-            let Some(survival) = self.survival() else { continue };
-            self.throughput = Vec3::ONE;
-            self.throughput_before *= weight.max_element() / survival;
-            self.radiance = Vec3::ZERO;
-            self.run();
-            add(direction, self.radiance * (share / (survival * density)));
-        }
-        incident
     }
 }
 
