@@ -194,7 +194,7 @@ impl Bsdf {
 
     /// The coat's local normal, if there is a coat.
     pub(crate) fn coat_normal(&self) -> Option<Vec3> {
-        (!self.coat.is_absent()).then(|| self.coat.frame.z)
+        (!self.coat.is_absent()).then_some(self.coat.frame.z)
     }
 
     /// Whether next event estimation can find light: not for a part that only reflects perfectly.
