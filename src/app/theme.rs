@@ -239,6 +239,11 @@ pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)
 }
 
+/// Shows such text.
+pub(super) fn note(ui: &mut Ui, text: impl Into<String>) {
+    ui.label(quiet(text));
+}
+
 /// Samples a pixel, in the mean.
 pub(super) fn samples(mean: f64) -> String {
     match mean {

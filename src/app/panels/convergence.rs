@@ -27,7 +27,7 @@ pub(in crate::app) fn show(
             ui.selectable_value(&mut convergence.by_samples, false, "Time");
             ui.selectable_value(&mut convergence.by_samples, true, "Samples");
         }
-        ui.label(theme::quiet("Earlier runs are dim"));
+        theme::note(ui, "Earlier runs are dim");
         let hint = "A picture of this view without noise; the true error is plotted, too";
         button(ui, ("Reference…", hint), commands, Command::Ask(Purpose::Reference));
         if let Some((reference, is_of_view)) = reference {
@@ -42,7 +42,7 @@ pub(in crate::app) fn show(
     });
     let lines = lines(convergence, by_samples);
     if lines.is_empty() {
-        ui.label(theme::quiet("The plot begins at two samples per pixel."));
+        theme::note(ui, "The plot begins at two samples per pixel.");
         return;
     }
     Plot::new("convergence")

@@ -45,7 +45,7 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &m
                 });
                 field.on_hover_text("Click to write a name or a note");
                 commands.extend(typed.map(|name| Command::RenameKept(i, name)));
-                ui.label(theme::quiet(&kept.summary));
+                theme::note(ui, &kept.summary);
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = 4.0;
                     side(ui, &mut chosen.left, i, "Left");

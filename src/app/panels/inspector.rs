@@ -1,6 +1,6 @@
 //! The map with its tiles, and what the cell under the pointer knows of them.
 
-use egui::{Color32, Grid, Rect, Response, RichText, Stroke, StrokeKind, Ui, Vec2};
+use egui::{Color32, Grid, RichText, Stroke, StrokeKind, Ui, Vec2};
 
 use super::button::button;
 use super::{color_bar, map_view, overlay, pixel_light};
@@ -28,27 +28,31 @@ pub(in crate::app) fn show(
     commands: &mut Vec<Command>,
 ) {
     let Some(map) = map else { return };
-    let size = map.environment.tile_grid();
     theme::section(ui, "TILES OF THE MAP");
     tile_views(ui, interface);
     let energies: Vec<f32> =
         map.environment.tile_energies().iter().map(|energy| *energy as f32).collect();
-    match (interface.tiles, inspector.learned()) {
-        (TileView::Learned, Some(sums)) => tiles(ui, interface, map, size, &shares(sums)),
-        (TileView::Learned, None) => {
-            tiles(ui, interface, map, size, &[]);
-            ui.label(theme::quiet("Nothing has been learned yet."));
-        }
-        (TileView::Energy, _) => tiles(ui, interface, map, size, &shares(&energies)),
+    let energies = shares(&energies);
+    let shown = match interface.tiles {
+        TileView::Learned => &shares(inspector.learned().unwrap_or_default()),
+        TileView::Energy => &energies,
+    };
+    let most = largest(shown);
+    tiles(ui, interface, map, (shown, most), map.sun.as_ref());
+    if !shown.is_empty() {
+        color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
+    }
+    if interface.tiles == TileView::Learned && inspector.learned().is_none() {
+        theme::note(ui, "Nothing has been learned yet.");
     }
     let turns = snapshot.map_or(0.0, |s| s.request.environment.rotation_and_intensity().0);
     if let Some(sun) = &map.sun {
-        ui.label(theme::quiet(sun_sentence(sun, turns)));
+        theme::note(ui, sun_sentence(sun, turns));
     }
     if let Some(tile) = interface.tile {
-        chosen_tile(ui, interface, size, tile, &shares(&energies));
+        chosen_tile(ui, interface, map.environment.tile_grid(), tile, &energies);
     } else {
-        ui.label(theme::quiet("Click a tile to see which cells sample it."));
+        theme::note(ui, "Click a tile to see which cells sample it.");
     }
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
         "Keeps the learned distributions, around their old centre, when the camera or a setting changes",
@@ -67,14 +71,12 @@ pub(in crate::app) fn show(
             }
             facts(ui, inspected);
             cached(ui, inspected, snapshot);
-            cell(ui, interface, inspector, inspected, (map, size));
+            cell(ui, interface, inspector, inspected, map);
         }
         None if interface.pinned.is_some() => {
-            ui.label(theme::quiet("There is no surface here, only the map; click elsewhere."));
+            theme::note(ui, "There is no surface here, only the map; click elsewhere.")
         }
-        None => {
-            ui.label(theme::quiet("Point at a surface; click to pin it."));
-        }
+        None => theme::note(ui, "Point at a surface; click to pin it."),
     }
     if snapshot.is_some_and(|s| s.main.grid.is_some()) {
         ui.add_space(4.0);
@@ -118,48 +120,44 @@ fn shares(values: &[f32]) -> Vec<f32> {
     values.iter().map(|v| if total > 0.0 { v / total } else { 0.0 }).collect()
 }
 
-/// The map under a heatmap of shares; a click chooses a tile.
+/// The map under a heatmap of logarithmic shares: 0.01 % is transparent, `most` opaque. Marks its sun and the chosen
+/// tile, and names the one under the pointer, which a click chooses.
 fn tiles(
     ui: &mut Ui,
     interface: &mut Interface,
     map: &LoadedMap,
-    size: (u32, u32),
-    shares: &[f32],
+    (shares, most): (&[f32], f32),
+    sun: Option<&Sun>,
 ) {
     let (rect, response) = map_view::ground(ui, map);
-    let most = largest(shares);
-    heatmap(ui, rect, size, shares, most);
-    if let Some(sun) = &map.sun {
+    let (size, painter) = (map.environment.tile_grid(), ui.painter_at(rect));
+    for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > MIN_SHARE) {
+        let t = (share / MIN_SHARE).ln() / (most / MIN_SHARE).ln();
+        let [r, g, b] = palette::viridis(t);
+        let color = Color32::from_rgba_unmultiplied(r, g, b, (90.0 + 150.0 * t) as u8);
+        painter.rect_filled(map_view::tile_rect(rect, size, tile as u32), 0.0, color);
+    }
+    if let Some(sun) = sun {
         let scale = rect.size()
             / Vec2::new(map.environment.map().width as f32, map.environment.map().height as f32);
         let at = rect.min
             + (Vec2::new(sun.texel[0] as f32, sun.texel[1] as f32) + Vec2::splat(0.5)) * scale;
-        ui.painter_at(rect).circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
+        painter.circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
     }
-    choose_tile(ui, interface, (rect, response), size, shares);
-    if !shares.is_empty() {
-        color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
-    }
-}
-
-/// Marks the chosen tile and names the one under the pointer, which a click chooses.
-fn choose_tile(
-    ui: &Ui,
-    interface: &mut Interface,
-    (rect, response): (Rect, Response),
-    size: (u32, u32),
-    shares: &[f32],
-) {
+    let mark = |tile: u32, color: Color32| {
+        let rect = map_view::tile_rect(rect, size, tile);
+        ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, color), StrokeKind::Outside);
+    };
     // A smaller map has fewer.
     if let Some(tile) = interface.tile.filter(|tile| *tile < size.0 * size.1) {
-        mark(ui, map_view::tile_rect(rect, size, tile), theme::ACCENT);
+        mark(tile, theme::ACCENT);
     }
     let pointed = response.hover_pos().and_then(|at| map_view::tile_at(rect, size, at));
     if response.clicked() {
         interface.tile = if interface.tile == pointed { None } else { pointed };
     }
     if let Some(tile) = pointed {
-        mark(ui, map_view::tile_rect(rect, size, tile), Color32::WHITE);
+        mark(tile, Color32::WHITE);
         let share = shares.get(tile as usize).copied().unwrap_or(0.0);
         response.on_hover_text(format!(
             "Tile {tile}: row {}, column {}\n{}",
@@ -176,21 +174,6 @@ const MIN_SHARE: f32 = 1e-4;
 /// The largest share, for the upper end of a scale.
 fn largest(shares: &[f32]) -> f32 {
     shares.iter().copied().fold(MIN_SHARE * 10.0, f32::max)
-}
-
-/// Logarithmic shares over the map: 0.01 % is transparent, `largest` opaque.
-fn heatmap(ui: &Ui, rect: Rect, size: (u32, u32), shares: &[f32], largest: f32) {
-    let painter = ui.painter_at(rect);
-    for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > MIN_SHARE) {
-        let t = (share / MIN_SHARE).ln() / (largest / MIN_SHARE).ln();
-        let [r, g, b] = palette::viridis(t);
-        let color = Color32::from_rgba_unmultiplied(r, g, b, (90.0 + 150.0 * t) as u8);
-        painter.rect_filled(map_view::tile_rect(rect, size, tile as u32), 0.0, color);
-    }
-}
-
-fn mark(ui: &Ui, rect: Rect, color: Color32) {
-    ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, color), StrokeKind::Outside);
 }
 
 fn chosen_tile(
@@ -243,23 +226,19 @@ fn cell(
     interface: &mut Interface,
     inspector: &Inspector,
     inspected: &Inspected,
-    (map, size): (&LoadedMap, (u32, u32)),
+    map: &LoadedMap,
 ) {
     let truth = inspector.truth();
     // One scale for both, so that they can be compared.
     let most = truth.map_or(0.0, |truth| largest(&truth.shares));
     let most = most.max(largest(&inspected.probabilities));
     if !inspected.probabilities.is_empty() {
-        let (rect, response) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &inspected.probabilities, most);
-        choose_tile(ui, interface, (rect, response), size, &inspected.probabilities);
+        tiles(ui, interface, map, (&inspected.probabilities, most), None);
         color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
-        ui.label(theme::quiet("Probability of each tile, learned"));
+        theme::note(ui, "Probability of each tile, learned");
     }
     if let Some(truth) = truth {
-        let (rect, response) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &truth.shares, most);
-        choose_tile(ui, interface, (rect, response), size, &truth.shares);
+        tiles(ui, interface, map, (&truth.shares, most), None);
         ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
             "Ground truth: no part of the map is visible from this point".to_owned()
         } else {
@@ -374,7 +353,7 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     let (cell, cache) = match (&inspected.cached, &snapshot.cache) {
         (Some(cell), Ok(cache)) => (cell, cache),
         (_, Err(missing)) => {
-            ui.label(theme::quiet(overlay::no_cache(*missing)));
+            theme::note(ui, overlay::no_cache(*missing));
             return;
         }
         (None, Ok(_)) => return,
@@ -414,10 +393,10 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
     let tiles = listed(&inspected.probabilities, truth.map(|truth| &truth.shares[..]));
     Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
         for name in ["Tile", "Share", "Tries", "Ratio"] {
-            ui.label(theme::quiet(name));
+            theme::note(ui, name);
         }
         if truth.is_some() {
-            ui.label(theme::quiet("Truth"));
+            theme::note(ui, "Truth");
         }
         ui.end_row();
         for tile in tiles {

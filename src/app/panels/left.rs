@@ -73,7 +73,7 @@ fn scene(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     let Controls { document, commands, .. } = controls;
     let mut chosen = None;
     theme::choice(ui, "scene").selected_text(theme::file_name(&document.scene)).show_ui(ui, |ui| {
-        ui.label(theme::quiet("Built in"));
+        theme::note(ui, "Built in");
         for name in builtin::names() {
             if ui.selectable_label(document.scene == *name, *name).clicked() {
                 chosen = Some((*name).to_owned());
@@ -116,7 +116,7 @@ fn files_named<'a>(
         return;
     }
     ui.separator();
-    ui.label(theme::quiet(title));
+    theme::note(ui, title);
     for name in list {
         let label = named(ui, current == name, small(name), &theme::file_name(name));
         if label.on_hover_text(name).clicked() {
@@ -207,7 +207,7 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     }
     let mut chosen = None;
     theme::choice(ui, "map").selected_text(theme::file_name(&document.map)).show_ui(ui, |ui| {
-        ui.label(theme::quiet("Built in"));
+        theme::note(ui, "Built in");
         for name in sky::names() {
             let name = format!("sky:{name}");
             let small = sources.small_maps.of(&name);

@@ -22,7 +22,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
         }
     });
     let Some(overlay) = interface.overlay else { return };
-    ui.label(theme::quiet(overlay.description()));
+    theme::note(ui, overlay.description());
     if !overlay.is_opaque() {
         let slider = theme::slider(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2);
         theme::set(ui, "Opacity", "", slider);
@@ -31,21 +31,17 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
     let cache = shown.filter(|_| overlay.is_of_cache()).map(|s| &s.order.snapshot.cache);
     match shown.and_then(|s| Some(&s.painted.as_ref()?.legend)) {
         Some(shown) => legend(ui, shown),
-        None if let Some(Err(missing)) = cache => {
-            ui.label(theme::quiet(no_cache(*missing)));
-        }
+        None if let Some(Err(missing)) = cache => theme::note(ui, no_cache(*missing)),
         None if overlay == Overlay::Tile && interface.tile.is_none() => {
-            ui.label(theme::quiet("Choose a tile on the map below."));
+            theme::note(ui, "Choose a tile on the map below.")
         }
         None if shown.is_some_and(|shown| shown.order.covers_now()) => {
-            ui.label(theme::quiet("Kept pictures have no overlays."));
+            theme::note(ui, "Kept pictures have no overlays.")
         }
-        None => {
-            ui.label(theme::quiet("The Light Grid has no cells yet."));
-        }
+        None => theme::note(ui, "The Light Grid has no cells yet."),
     }
     if let Some(Ok(cache)) = cache {
-        ui.label(theme::quiet(format!("The whole cache: {}", cache_size(cache))));
+        theme::note(ui, format!("The whole cache: {}", cache_size(cache)));
     }
 }
 
@@ -73,7 +69,7 @@ fn legend(ui: &mut Ui, legend: &Legend) {
             let text = |value| theme::figure(f64::from(value));
             color_bar::show(ui, (*low, *high), *logarithmic, text);
             let kind = if *logarithmic { "logarithmic" } else { "linear" };
-            ui.label(theme::quiet(format!("{unit}, {kind}")));
+            theme::note(ui, format!("{unit}, {kind}"));
         }
         Legend::Names(names) => {
             for (color, name) in names {
@@ -88,12 +84,10 @@ fn legend(ui: &mut Ui, legend: &Legend) {
             let size = Vec2::new(ui.available_width(), 0.3 * ui.available_width());
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
             color_bar::patches(ui, rect, (48, 12), palette::of_map_place);
-            ui.label(theme::quiet("Place on the map"));
+            theme::note(ui, "Place on the map");
         }
         Legend::None => {}
-        Legend::Empty => {
-            ui.label(theme::quiet("No pixel has a value."));
-        }
+        Legend::Empty => theme::note(ui, "No pixel has a value."),
     }
 }
 

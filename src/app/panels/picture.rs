@@ -81,7 +81,7 @@ fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
             };
         }
         if let Some(exposure_ev) = exposure_ev.filter(|_| look.auto_exposure) {
-            ui.label(theme::quiet(format!("{exposure_ev:+.1} EV in total")));
+            theme::note(ui, format!("{exposure_ev:+.1} EV in total"));
         }
     });
 }
@@ -165,7 +165,7 @@ fn stop(ui: &mut Ui, document: &mut Document) {
     });
     stop.noise = percent.map(|percent| percent / 100.0);
     if stop.samples.is_none() && stop.seconds.is_none() && stop.noise.is_none() {
-        ui.label(theme::quiet("No limit: it goes on until it is paused"));
+        theme::note(ui, "No limit: it goes on until it is paused");
     }
 }
 

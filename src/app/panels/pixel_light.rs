@@ -44,7 +44,7 @@ pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
         });
     }
     for sentence in sentences(parts, truth.unblocked, misplaced) {
-        ui.label(theme::quiet(sentence));
+        theme::note(ui, sentence);
     }
 }
 

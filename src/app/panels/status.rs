@@ -187,7 +187,7 @@ fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new(value).color(theme::TEXT));
-        ui.label(theme::quiet(unit));
+        theme::note(ui, unit);
     })
     .response
     .on_hover_text(hint);
