@@ -1,13 +1,14 @@
 //! The talk's comparison of summed-area tables, with one more extreme map.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::machine::Machine;
+pub use super::pages::sat::{Measured, REMARK, markdown};
+use super::pages::{sat, write_text};
 use super::store::Store;
-use crate::environment::{SatReport, TALKS_MAPS, TIMED_SAMPLES, TableKind, sat_report, sky};
+use crate::environment::{TALKS_MAPS, TIMED_SAMPLES, sat_report, sky};
 use crate::error::Result;
 use crate::image::Image;
 use crate::math::direction_from_uv;
@@ -28,17 +29,6 @@ pub fn cases() -> Vec<Case> {
     let talks =
         TALKS_MAPS.map(|(title, size, mse)| Case { title, size, published: Some(mse) }).to_vec();
     [talks, vec![Case { title: "Extreme", size: (10_000, 5000), published: None }]].concat()
-}
-
-/// A finished case.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// Title of the case.
-    pub title: String,
-    /// Errors of u32 and f32 in the talk.
-    pub published: Option<[f64; 2]>,
-    /// Figures of every table.
-    pub report: SatReport,
 }
 
 impl Case {
@@ -103,72 +93,8 @@ pub fn measure_all(
             store.write(&key, &all[all.len() - 1])?;
             let value = crate::output::record::to_value(&all)?;
             crate::output::record::write_json(&folder.join("sat.json"), &value)?;
-            super::pages::write_text(&folder.join("sat.csv"), &csv(&all))?;
+            write_text(&folder.join("sat.csv"), &sat::csv(&all))?;
         }
     }
     Ok(all)
 }
-
-fn csv(all: &[Measured]) -> String {
-    let mut text = String::from(
-        "map,width,height,table,mse,zero_mass_share,zero_mass_energy,falling_share,build_seconds,\
-         sample_nanoseconds,bytes\n",
-    );
-    for Measured { title, report, .. } in all {
-        for row in &report.rows {
-            let _ = writeln!(
-                text,
-                "{title},{},{},{},{},{},{},{},{},{},{}",
-                report.width,
-                report.height,
-                row.table,
-                row.mean_squared_error,
-                row.missed_share,
-                row.missed_energy_share,
-                row.falling_share,
-                row.build_seconds,
-                row.sample_nanoseconds,
-                row.table_bytes
-            );
-        }
-    }
-    text
-}
-
-/// All cases as one Markdown table, with the talk's errors.
-pub fn markdown(all: &[Measured]) -> String {
-    let mut text = String::from(
-        "| map | table | MSE | the talk's | zero mass | falling steps | build | a sample | memory |\n\
-         |---|---|---|---|---|---|---|---|---|\n",
-    );
-    for Measured { title, published, report } in all {
-        for row in &report.rows {
-            let theirs = published.and_then(|[u32s, f32s]| match row.table {
-                TableKind::U32 => Some(u32s),
-                TableKind::F32 => Some(f32s),
-                TableKind::TileLocal | TableKind::F64 => None,
-            });
-            let _ = writeln!(
-                text,
-                "| {title} {}x{} | {} | {:.1e} | {} | {:.2} % | {:.2} % | {:.2} s | {:.0} ns | {:.0} MB |",
-                report.width,
-                report.height,
-                row.table,
-                row.mean_squared_error,
-                theirs.map_or_else(|| "-".to_owned(), |mse| format!("{mse:.1e}")),
-                100.0 * row.missed_share,
-                100.0 * row.falling_share,
-                row.build_seconds,
-                row.sample_nanoseconds,
-                row.table_bytes as f64 / 1e6
-            );
-        }
-    }
-    text
-}
-
-/// Differences between the talk's figures and ours.
-pub const REMARK: &str = "MSE: in units of the mean texel density, exact (the search of each table \
-    followed for all random numbers at once). The talk does not say its unit, nor are its maps public: \
-    compare ratios. Zero mass: share of the lit texels that are never sampled. Falling steps: share of \
-    the steps along a row in which the sums fall.";

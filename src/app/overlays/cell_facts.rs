@@ -4,7 +4,7 @@ use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 
 /// What overlays and the inspector say of cells; distributions are indexed as in the grid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct CellFacts {
     /// Entropy of each distribution in bits.
     pub entropy: Vec<f32>,
@@ -29,13 +29,7 @@ impl CellFacts {
         let tiles = distributions.tile_count();
         let whole: Vec<f32> =
             (0..tiles).map(|tile| distributions.probability(WHOLE_MAP, tile)).collect();
-        let mut facts = Self {
-            entropy: Vec::new(),
-            distance: Vec::new(),
-            best_tile: Vec::new(),
-            tries: Vec::new(),
-            visible: Vec::new(),
-        };
+        let mut facts = Self::default();
         for distribution in 0..distributions.len() {
             let (mut entropy, mut distance, mut best) = (0.0, 0.0, (0.0, 0));
             for tile in 0..tiles {

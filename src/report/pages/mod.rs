@@ -9,6 +9,7 @@ mod page;
 mod pictures;
 mod plots;
 mod results;
+pub(super) mod sat;
 
 pub use format::duration;
 pub use results::{markdown_table, row_sentence};
@@ -21,7 +22,7 @@ use crate::output::record::{to_value, write_json};
 /// Writes all files of a report into a folder.
 pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     write_json(&folder.join("report.json"), &to_value(report)?)?;
-    write_text(&folder.join("report.csv"), &csv::table(report))?;
+    write_text(&folder.join("report.csv"), &csv::Table { report }.to_string())?;
     let plots = folder.join("plots");
     make_folder(&plots)?;
     let page = page::Page::new(report)?;
