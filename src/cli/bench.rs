@@ -116,7 +116,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let bench = measure(&options, &subjects, &interrupt.asked, &|doing| progress.say(doing))?;
     progress.finish();
     if let Some(file) = &arguments.json {
-        write_json(file, &crate::output::record::to_value(&bench)?)?;
+        write_json(file, &bench)?;
         say_written(file);
     }
     print(bench.to_string().trim_end())?;

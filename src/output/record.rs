@@ -191,7 +191,7 @@ pub fn to_value(value: &impl Serialize) -> Result<Value> {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_json(path: &Path, value: &Value) -> Result<()> {
-    let text = to_json(value)?;
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = to_json(&to_value(value)?)?;
     write_beside_and_rename(path, |file| writeln!(file, "{text}"))
 }

@@ -90,21 +90,16 @@ impl Context<'_> {
                 continue;
             };
             let key = format!("{}_shares", self.key(state, fastest, method, 0));
-            let found = match self.store.read(&key) {
-                Some(found) => found,
-                None => {
-                    self.say(
-                        &format!("{}: sources of {}'s error", state.prepared.title, method.name),
-                        SHARE_RUNS * self.plan.effort.seconds,
-                        state.rows_after,
-                    );
-                    let place = self.place(state, fastest, &method.settings);
-                    let found = place.shares(method, (samples / 8).max(4), &reference)?;
-                    let Some(found) = found else { return Ok(false) };
-                    self.store.write(&key, &found)?;
-                    found
-                }
-            };
+            let found = self.store.kept(&key, || {
+                self.say(
+                    &format!("{}: sources of {}'s error", state.prepared.title, method.name),
+                    SHARE_RUNS * self.plan.effort.seconds,
+                    state.rows_after,
+                );
+                let place = self.place(state, fastest, &method.settings);
+                place.shares(method, (samples / 8).max(4), &reference)
+            });
+            let Some(found) = found? else { return Ok(false) };
             row.shares.push(found);
         }
         Ok(true)
@@ -118,18 +113,10 @@ impl Context<'_> {
             for (method, runs) in self.plan.methods.iter().zip(methods) {
                 let Some((key, _)) = runs.first() else { continue };
                 let key = format!("{key}_bias_of_{}_by_{pictures}", runs.len());
-                let found = match self.store.read(&key) {
-                    Some(found) => Some(found),
-                    None => {
-                        let device = self.devices[device].device.title();
-                        let bias = self
-                            .last_pictures(runs)
-                            .and_then(|p| Bias::new(device, &method.name, &p, &reference));
-                        bias.iter().try_for_each(|bias| self.store.write(&key, bias))?;
-                        bias
-                    }
-                };
-                row.biases.extend(found);
+                let device = self.devices[device].device.title();
+                let of = |p: Vec<_>| Bias::new(device, &method.name, &p, &reference);
+                let found = || Ok(self.last_pictures(runs).and_then(of));
+                row.biases.extend(self.store.kept(&key, found)?);
             }
         }
         Ok(())

@@ -148,7 +148,7 @@ pub struct Frame {
 }
 
 /// A scene under a map.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Row {
     /// Its title.
     pub title: String,
@@ -169,8 +169,7 @@ impl Row {
             title: format!("{scene} / {map}"),
             scene: scene.to_owned(),
             map: map.to_owned(),
-            published: None,
-            target: None,
+            ..Self::default()
         }
     }
 

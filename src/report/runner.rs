@@ -79,11 +79,7 @@ impl Runner<'_> {
             notices: prepared.notices.iter().map(str::to_owned).collect(),
             triangles: prepared.world.scene.shown_triangles() as usize,
             map_size: prepared.map_size,
-            reference: None,
-            devices: Vec::new(),
-            shares: Vec::new(),
-            biases: Vec::new(),
-            pictures: Pictures::default(),
+            ..RowReport::default()
         };
         self.report.rows.push(report);
         let reference = file_reference

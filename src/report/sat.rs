@@ -12,6 +12,7 @@ use crate::environment::{TALKS_MAPS, TIMED_SAMPLES, sat_report, sky};
 use crate::error::Result;
 use crate::image::Image;
 use crate::math::direction_from_uv;
+use crate::output::record::write_json;
 
 /// A map with the talk's published errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -91,8 +92,7 @@ pub fn measure_all(
         all.push(measured);
         if let (Some(store), Some(folder)) = (&store, folder) {
             store.write(&key, &all[all.len() - 1])?;
-            let value = crate::output::record::to_value(&all)?;
-            crate::output::record::write_json(&folder.join("sat.json"), &value)?;
+            write_json(&folder.join("sat.json"), &all)?;
             write_text(&folder.join("sat.csv"), &sat::csv(&all))?;
         }
     }

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::error::Result;
 use crate::image::{Image, make_folder, write_beside_and_rename};
-use crate::output::record::{to_value, write_json};
+use crate::output::record::write_json;
 
 /// A report's folder: pages at the top, runs and references below.
 #[derive(Debug, Clone)]
@@ -45,7 +45,19 @@ impl Store {
 
     /// Stores a value under a name.
     pub(super) fn write(&self, key: &str, value: &impl Serialize) -> Result<()> {
-        write_json(&self.path(key, "json"), &to_value(value)?)
+        write_json(&self.path(key, "json"), value)
+    }
+
+    /// The value stored under a name, or else what is made, which is stored.
+    pub(super) fn kept<T: DeserializeOwned + Serialize>(
+        &self,
+        key: &str,
+        make: impl FnOnce() -> Result<Option<T>>,
+    ) -> Result<Option<T>> {
+        let kept = self.read(key);
+        let made = if kept.is_none() { make()? } else { None };
+        made.iter().try_for_each(|made| self.write(key, made))?;
+        Ok(kept.or(made))
     }
 
     /// The pictures stored under a name, all of one size.

@@ -87,7 +87,7 @@ pub struct Report {
 }
 
 /// One scene under one map.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct RowReport {
     /// Scene and map.
     pub row: Row,

@@ -17,11 +17,11 @@ pub use results::{markdown_table, row_sentence};
 use super::summary::Report;
 use crate::error::Result;
 use crate::image::{make_folder, write_beside_and_rename};
-use crate::output::record::{to_value, write_json};
+use crate::output::record::write_json;
 
 /// Writes all files of a report into a folder.
 pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
-    write_json(&folder.join("report.json"), &to_value(report)?)?;
+    write_json(&folder.join("report.json"), report)?;
     write_text(&folder.join("report.csv"), &csv::Table { report }.to_string())?;
     let plots = folder.join("plots");
     make_folder(&plots)?;
@@ -35,7 +35,7 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
             write_text(&plots.join(file_name(&name)), plot)?;
         }
     }
-    write_text(&folder.join("report.html"), &plots::rendered(&page)?)
+    write_text(&folder.join("report.html"), &page.to_string())
 }
 
 pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {

@@ -67,7 +67,7 @@ impl<'a> Page<'a> {
         };
         let sections =
             report.rows.iter().map(|row| Section::new(report, row)).collect::<Result<_>>()?;
-        Ok(Self { report, overview: overview?, ablations, sections })
+        Ok(Self { report, overview, ablations, sections })
     }
 }
 
@@ -93,26 +93,20 @@ fn ablations<'a>(report: &'a Report) -> Vec<AblationLine<'a>> {
 
 impl<'a> Section<'a> {
     fn new(report: &'a Report, row: &'a RowReport) -> Result<Self> {
-        let mut error_plots = Vec::new();
-        for device in &row.devices {
-            let plot = error_plot(device, report.plan.effort.seconds)?;
-            error_plots.extend(plot.map(|plot| (device.device, plot)));
-        }
+        let of_errors = |device: &DeviceReport| {
+            Some((device.device, error_plot(device, report.plan.effort.seconds)?))
+        };
+        let error_plots: Vec<_> = row.devices.iter().filter_map(of_errors).collect();
         if !report.is_long() {
             let plots = error_plots.iter().map(|(_, plot)| plot.clone()).collect();
             return Ok(Self { row, error_plots, plots, pictures: Pictures::new(row)? });
         }
-        let mut plots = Vec::new();
-        for device in &row.devices {
-            let group = |(index, m): (usize, &'a MethodReport)| {
-                let found = m.speed_up(report.last_baseline(), Measure::TrimmedRelMse)?;
-                let bar = Bar::new(&m.method.name, index, found.ratio, found.interval);
-                Some(Group::of_method(bar))
-            };
-            let groups = device.methods.iter().enumerate().filter_map(group).collect();
-            let plot = speed_up_plot(device.device.title(), report.last_baseline(), groups);
-            plots.extend(plot?);
-        }
+        let baseline = report.last_baseline();
+        let of_speed_ups = |device: &'a DeviceReport| {
+            let groups = Bar::all(device, baseline).map(Group::of_method).collect();
+            speed_up_plot(device.device.title(), baseline, groups)
+        };
+        let plots = row.devices.iter().filter_map(of_speed_ups).collect();
         Ok(Self { row, error_plots, plots, pictures: None })
     }
 }

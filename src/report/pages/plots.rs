@@ -4,15 +4,6 @@ use askama::Template;
 
 use super::super::statistics::{Bundle, Interval};
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport, curves};
-use crate::error::{Error, Result};
-
-/// The text of a template.
-///
-/// # Errors
-/// If a part of it cannot be written as text.
-pub(super) fn rendered(template: &impl Template) -> Result<String> {
-    template.render().map_err(|e| Error::new(e.to_string()))
-}
 
 /// Inks that people with any kind of colour vision tell apart (Okabe and Ito 2008).
 const INKS: [&str; 9] = [
@@ -122,7 +113,7 @@ struct ErrorCurve<'a> {
 const NAME_HEIGHT: f64 = 16.0;
 
 /// The plot of a device; `None` before there are errors. `end` is the time of a run in seconds.
-pub(super) fn error_plot(device: &DeviceReport, end: f64) -> Result<Option<String>> {
+pub(super) fn error_plot(device: &DeviceReport, end: f64) -> Option<String> {
     let measure = Measure::TrimmedRelMse;
     let mean_errors = |(index, method): (usize, &'_ MethodReport)| {
         let bundle = Bundle::new(&curves(&method.runs, measure), end)?;
@@ -137,7 +128,7 @@ pub(super) fn error_plot(device: &DeviceReport, end: f64) -> Result<Option<Strin
     };
     let means: Vec<_> = device.methods.iter().enumerate().filter_map(mean_errors).collect();
     let all = || means.iter().flat_map(|(_, points)| points);
-    let Some(start) = all().map(|p| p.0).reduce(f64::min) else { return Ok(None) };
+    let start = all().map(|p| p.0).reduce(f64::min)?;
     let low = all().map(|p| (p.1 - p.2).max(0.5 * p.1)).fold(f64::INFINITY, f64::min);
     let high = all().map(|p| p.1 + p.2).fold(0.0, f64::max);
     let x = LogAxis { low: start * 0.95, high: end, from: 70.0, to: 460.0 };
@@ -166,7 +157,7 @@ pub(super) fn error_plot(device: &DeviceReport, end: f64) -> Result<Option<Strin
         guide: guide(x, y),
         curves,
     };
-    rendered(&plot).map(Some)
+    Some(plot.to_string())
 }
 
 /// Moves names apart, downwards as far as `bottom` and upwards from there.
@@ -237,14 +228,9 @@ const LANE: f64 = 13.0;
 impl<'a> Group<'a> {
     /// All methods of a row on a device.
     pub(super) fn of_row(report: &'a Report, row: &RowReport, device: &'a DeviceReport) -> Self {
-        let methods = device.methods.iter().enumerate();
-        let bars = methods.filter_map(|(index, m)| {
-            let found = m.speed_up(report.baseline(), Measure::TrimmedRelMse)?;
-            Some(Bar::new(&m.method.name, index, found.ratio, found.interval))
-        });
         Self {
             title: format!("{}, {}", row.row.title, device.device.title()),
-            bars: bars.collect(),
+            bars: Bar::all(device, report.baseline()).collect(),
             published: row.row.published_on(device.device),
             target: row.row.target,
             ..Self::default()
@@ -274,6 +260,14 @@ impl<'a> Bar<'a> {
     pub(super) fn new(name: &'a str, index: usize, ratio: f64, interval: Option<Interval>) -> Self {
         Self { name, ink: ink(name, index), ratio, interval, y: 0.0 }
     }
+
+    /// Those of a device's methods that have a speed-up over the baseline.
+    pub(super) fn all(device: &'a DeviceReport, baseline: &str) -> impl Iterator<Item = Self> {
+        device.methods.iter().enumerate().filter_map(move |(index, m)| {
+            let found = m.speed_up(baseline, Measure::TrimmedRelMse)?;
+            Some(Self::new(&m.method.name, index, found.ratio, found.interval))
+        })
+    }
 }
 
 /// The plot of groups; `None` if they have no bars.
@@ -281,7 +275,7 @@ pub(super) fn speed_up_plot(
     title: &str,
     baseline: &str,
     mut groups: Vec<Group<'_>>,
-) -> Result<Option<String>> {
+) -> Option<String> {
     let (mut low, mut high) = (0.8_f64, 1.6_f64);
     let mut names: Vec<(&str, &str)> = Vec::new();
     for group in &groups {
@@ -300,7 +294,7 @@ pub(super) fn speed_up_plot(
         }
     }
     let widths = groups.iter().map(|group| group.title.chars().count());
-    let Some(widest) = widths.max().filter(|_| !names.is_empty()) else { return Ok(None) };
+    let widest = widths.max().filter(|_| !names.is_empty())?;
     // Without one each group is a single method, which its title names.
     let has_legend = groups.iter().any(|group| group.bars.len() > 1) || names.len() <= 4;
     let (top, gap) = if has_legend { (84.0, 14.0) } else { (40.0, 5.0) };
@@ -323,5 +317,5 @@ pub(super) fn speed_up_plot(
         names,
         groups,
     };
-    rendered(&plot).map(Some)
+    Some(plot.to_string())
 }
