@@ -1,13 +1,15 @@
-//! Figures of a bench.
+//! Figures of a bench, and tables of them for a terminal.
 
+use askama::Template;
 use serde::Serialize;
 
-use super::rays::RayFigures;
+use super::rays::{RayFigures, RayKind};
 use crate::render::gpu::{AdapterFacts, KernelFacts, Schedule};
 use crate::report::Machine;
 
 /// All figures of a machine.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Template)]
+#[template(path = "bench.txt", escape = "none")]
 pub struct Bench {
     /// The machine.
     pub machine: Machine,
@@ -45,6 +47,19 @@ pub struct SceneFigures {
     pub rays: Vec<RayFigures>,
     /// Figures of whole paths.
     pub paths: Option<PathFigures>,
+}
+
+impl SceneFigures {
+    /// Millions of rays of a kind per second, where they were measured.
+    fn rate(&self, kind: RayKind) -> String {
+        let found = self.rays.iter().find(|rays| rays.kind == kind);
+        found.map_or("-".to_owned(), |rays| millions(rays.per_second))
+    }
+}
+
+fn millions(per_second: f64) -> String {
+    let millions = per_second * 1e-6;
+    if millions < 99.95 { format!("{millions:.2}") } else { format!("{millions:.0}") }
 }
 
 /// Figures of whole paths, with the defaults of `lightgrid render`.

@@ -5,7 +5,6 @@
 mod figures;
 mod place;
 mod rays;
-mod tables;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

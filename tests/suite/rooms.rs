@@ -32,7 +32,7 @@ const FLOORS: [&[&str]; 15] = [
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
 const CRATES: [(&str, &[&str]); 32] = [
-    ("askama", &["report/pages"]),
+    ("askama", &["bench/figures", "report/pages"]),
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["render/gpu/features", "scene/needs"]),
