@@ -1,6 +1,6 @@
 //! Speed-ups of all rows: the table of the page and of the terminal.
 
-use std::fmt::Write as _;
+use askama::Template;
 
 use super::super::plan::Method;
 use super::super::summary::{CLEAN_FLIP, DeviceReport, Measure, MethodReport, Report, RowReport};
@@ -78,37 +78,22 @@ pub(super) fn clean_cells(report: &Report, row: &RowReport, device: &DeviceRepor
     names.into_iter().chain(report.plan.methods.iter().map(cell)).collect()
 }
 
+#[derive(Template)]
+#[template(path = "results.md", escape = "none")]
+struct Markdown<'a> {
+    report: &'a Report,
+    table: Table<'a>,
+}
+
 /// Speed-ups of all rows and, of few methods, seconds to clean pictures, as Markdown tables.
 pub fn markdown_table(report: &Report) -> String {
-    let table = Table::new(report);
-    let mut text = markdown(report, &table.head, |row, device| table.cells(row, device));
-    if !report.is_long() {
-        let _ = write!(text, "\n{}:\n\n", clean_title());
-        let cells = |row: &_, device: &_| clean_cells(report, row, device);
-        text += &markdown(report, &clean_head(report), cells);
-    }
-    text
+    Markdown { report, table: Table::new(report) }.to_string()
 }
 
 /// What the table of seconds to clean pictures is called.
 pub(super) fn clean_title() -> String {
     let flips = CLEAN_FLIP.map(|flip| format!("{flip:.2}")).join(" / ");
     format!("Seconds to FLIP {flips} of pictures denoised by {}", Denoiser::Best.name())
-}
-
-fn markdown(
-    report: &Report,
-    head: &[&str],
-    cells: impl Fn(&RowReport, &DeviceReport) -> Vec<String>,
-) -> String {
-    let mut text = format!("| {} |\n", head.join(" | "));
-    let _ = writeln!(text, "|{}", "---|".repeat(head.len()));
-    for row in &report.rows {
-        for device in &row.devices {
-            let _ = writeln!(text, "| {} |", cells(row, device).join(" | "));
-        }
-    }
-    text
 }
 
 /// A finished row in a line, for a terminal.
