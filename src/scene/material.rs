@@ -255,16 +255,16 @@ impl Material {
     }
 }
 
-/// What happens to texture coordinates outside `[0,1]`.
+/// What happens to texture coordinates outside `[0,1]`. Shaders know each by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
     /// Tiles.
     #[default]
-    Repeat,
+    Repeat = 0,
     /// Tiles, every other one mirrored.
-    MirroredRepeat,
+    MirroredRepeat = 1,
     /// Holds the edge.
-    ClampToEdge,
+    ClampToEdge = 2,
 }
 
 /// An image and how it is sampled (level 0 only: a path tracer filters by sampling).

@@ -35,7 +35,7 @@ const CRATES: [(&str, &[&str]); 32] = [
     ("askama", &["bench/figures", "report/pages"]),
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
-    ("bitflags", &["render/gpu/features", "scene/needs"]),
+    ("bitflags", &["render/gpu/features", "render/gpu/layout", "scene/needs"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli/generate"]),
     ("clap_mangen", &["cli/generate"]),

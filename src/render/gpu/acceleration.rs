@@ -9,7 +9,7 @@ use wgpu::{
 use super::buffer::buffer;
 use super::buffers::PIECE_BYTES;
 use super::device::Gpu;
-use super::layout::material_flags::{ALPHA_MASK, BACKED, CLEAR_SOLID, PARTIAL};
+use super::layout::MaterialFlags as Flags;
 use crate::bvh::InstanceWords;
 use crate::error::{Error, Result};
 use crate::path::World;
@@ -49,7 +49,8 @@ impl Acceleration {
         let scene = &world.scene;
         let name = &gpu.facts().name;
         let meshes = scene.instances.meshes();
-        let asked = ALPHA_MASK | BACKED | CLEAR_SOLID | PARTIAL;
+        let asked =
+            (Flags::ALPHA_MASK | Flags::BACKED | Flags::CLEAR_SOLID | Flags::PARTIAL).bits();
         let is_opaque = |triangle: &u32| flags_of(*triangle) & asked == 0;
         let mut triangles = Vec::with_capacity(scene.triangles.len());
         let mut lower = Vec::with_capacity(1 + meshes.len());

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::layout::{DIRECTIONAL_LIGHT, NO_TEXTURE, PUNCTUAL_WORDS, SPOT_LIGHT};
-use super::layout::{material_flags as material, texture_flags};
+use super::layout::{WRAP_U_SHIFT, WRAP_V_SHIFT};
 use crate::bsdf::{albedo, coat, interface, lobes, microfacet, rescatter, sheen};
 use crate::light_grid::{WHOLE_MAP, cells, counters};
 use crate::path::{self, light_tree, limits, shadows, sharing, splitting, train};
@@ -59,19 +59,13 @@ pub(crate) use constants;
 constants! {
     ALBEDO_NODES: albedo::COSINES,
     ALBEDO_ONE: cache::ALBEDO_ONE,
-    ALPHA_BLEND: material::ALPHA_BLEND,
-    ALPHA_MASK: material::ALPHA_MASK,
-    BACKED: material::BACKED,
     CACHE_CHECK_SEED: cache::CHECK_SEED,
     CACHE_PARENT: cache::PARENT,
     CACHE_PROBES: cache::MAX_PROBES,
     CACHE_SLOTS: cache::SLOTS,
     CACHE_WORDS: cache::WORDS,
-    CLEAR_SOLID: material::CLEAR_SOLID,
     COAT_F0: coat::F0,
-    DEEP: texture_flags::DEEP,
     DIRECTIONAL_LIGHT: DIRECTIONAL_LIGHT,
-    DOUBLE_SIDED: material::DOUBLE_SIDED,
     FILTER_RADIUS: filter::FILTER_RADIUS,
     FILTER_STEPS: filter::STEPS,
     LEARNING_SEED: cpu::LEARNING_SEED,
@@ -97,12 +91,9 @@ constants! {
     MIN_SHEEN_ROUGHNESS: sheen::MIN_ROUGHNESS,
     MAX_COUNTED: path::MAX_COUNTED,
     MAX_TIMES: train::MAX_TIMES,
-    NEAREST: texture_flags::NEAREST,
     NEAREST_SQUARED: light_tree::NEAREST_SQUARED,
     NO_TEXTURE: NO_TEXTURE,
-    NORMAL_MAPPED: material::NORMAL_MAPPED,
     PAIRS_OF_ESTIMATES: sampler::PAIRS_OF_ESTIMATES,
-    PARTIAL: material::PARTIAL,
     PUNCTUAL_WORDS: PUNCTUAL_WORDS,
     RESCATTER_INDEX: rescatter::MAX_INDEX,
     RESCATTER_INDICES: rescatter::INDICES,
@@ -113,21 +104,17 @@ constants! {
     SHADOW_RAY_SHARE: shadows::SHADOW_RAY_SHARE,
     SHEEN_NODES: sheen::COSINES,
     SHEEN_TYPICAL: sheen::Sheen::TYPICAL,
-    SECOND_UV_SET: texture_flags::SECOND_UV_SET,
     SMOOTH_ALPHA: microfacet::SMOOTH_ALPHA,
     SPOT_LIGHT: SPOT_LIGHT,
-    SRGB: texture_flags::SRGB,
     STRAIGHT_ETA: interface::STRAIGHT_ETA,
-    THIN: material::THIN,
     TILE_SEED: sharing::TILE_SEED,
     TRAINING_SEED: cpu::TRAINING_SEED,
     TRAINING_VERTICES: path::TRAINING_VERTICES,
     TRUE_COSINE_SHARE: sharing::TRUE_COSINE_SHARE,
     TRUE_MIRROR_COSINE: sharing::TRUE_MIRROR_COSINE,
     TRUE_MIRROR_SHARE: sharing::TRUE_MIRROR_SHARE,
-    UNLIT: material::UNLIT,
     WEIGHT_ONE: counters::WEIGHT_ONE,
     WHOLE_MAP: WHOLE_MAP,
-    WRAP_U_SHIFT: texture_flags::WRAP_U_SHIFT,
-    WRAP_V_SHIFT: texture_flags::WRAP_V_SHIFT,
+    WRAP_U_SHIFT: WRAP_U_SHIFT,
+    WRAP_V_SHIFT: WRAP_V_SHIFT,
 }

@@ -16,7 +16,7 @@ use crate::path::camera::CameraRays;
 use crate::path::{LocalLights, World};
 use crate::radiance_cache::CacheCells;
 use crate::scene::surface::absorption;
-use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
+use crate::scene::{self, AlphaMode, PunctualKind, Scene};
 
 /// No distribution of cells.
 pub(crate) const NO_ARRAY: u32 = u32::MAX;
@@ -152,28 +152,32 @@ pub(crate) struct TextureRef {
     pub(crate) padding: Vec2,
 }
 
-/// Flags of `Material`; `constants.rs` writes them into the shaders.
-pub(super) mod material_flags {
-    pub(in super::super) const ALPHA_MASK: u32 = 1;
-    pub(in super::super) const ALPHA_BLEND: u32 = 2;
-    pub(in super::super) const DOUBLE_SIDED: u32 = 4;
-    pub(in super::super) const UNLIT: u32 = 8;
-    pub(in super::super) const THIN: u32 = 16;
-    pub(in super::super) const PARTIAL: u32 = 32;
-    pub(in super::super) const NORMAL_MAPPED: u32 = 64;
-    pub(in super::super) const CLEAR_SOLID: u32 = 128;
-    pub(in super::super) const BACKED: u32 = 256;
+bitflags::bitflags! {
+    /// Flags of `Material`; `shader.rs` writes them into the shaders.
+    pub(super) struct MaterialFlags: u32 {
+        const ALPHA_MASK = 1;
+        const ALPHA_BLEND = 2;
+        const DOUBLE_SIDED = 4;
+        const UNLIT = 8;
+        const THIN = 16;
+        const PARTIAL = 32;
+        const NORMAL_MAPPED = 64;
+        const CLEAR_SOLID = 128;
+        const BACKED = 256;
+    }
+
+    /// Flags of `TextureRef`; `shader.rs` writes them into the shaders.
+    pub(super) struct TextureFlags: u32 {
+        const SECOND_UV_SET = 1;
+        const NEAREST = 2;
+        const SRGB = 4;
+        const DEEP = 8;
+    }
 }
 
-/// Flags of `TextureRef`; `constants.rs` writes them into the shaders.
-pub(super) mod texture_flags {
-    pub(in super::super) const SECOND_UV_SET: u32 = 1;
-    pub(in super::super) const NEAREST: u32 = 2;
-    pub(in super::super) const SRGB: u32 = 4;
-    pub(in super::super) const DEEP: u32 = 8;
-    pub(in super::super) const WRAP_U_SHIFT: u32 = 4;
-    pub(in super::super) const WRAP_V_SHIFT: u32 = 6;
-}
+/// Where the flags of `TextureRef` hold how it goes on outside of the picture, in 2 bits each.
+pub(super) const WRAP_U_SHIFT: u32 = 4;
+pub(super) const WRAP_V_SHIFT: u32 = 6;
 
 impl Globals {
     /// Where the radiance cache's cells lie, and what a radiance of 1 counts.
@@ -359,54 +363,38 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
 }
 
 fn flags(m: &scene::Material, partial: bool) -> u32 {
-    use material_flags::{
-        ALPHA_BLEND, ALPHA_MASK, BACKED, CLEAR_SOLID, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN,
-        UNLIT,
-    };
-    [
-        (ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
-        (ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
-        (DOUBLE_SIDED, m.double_sided),
-        (UNLIT, m.unlit),
-        (THIN, m.thickness <= 0.0),
-        (PARTIAL, partial),
-        (NORMAL_MAPPED, m.has_normal_map()),
-        (CLEAR_SOLID, m.is_clear_solid()),
-        (BACKED, m.backed),
-    ]
-    .into_iter()
-    .filter(|(_, set)| *set)
-    .fold(0, |flags, (flag, _)| flags | flag)
+    let mut flags = MaterialFlags::empty();
+    flags.set(MaterialFlags::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. }));
+    flags.set(MaterialFlags::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend);
+    flags.set(MaterialFlags::DOUBLE_SIDED, m.double_sided);
+    flags.set(MaterialFlags::UNLIT, m.unlit);
+    flags.set(MaterialFlags::THIN, m.thickness <= 0.0);
+    flags.set(MaterialFlags::PARTIAL, partial);
+    flags.set(MaterialFlags::NORMAL_MAPPED, m.has_normal_map());
+    flags.set(MaterialFlags::CLEAR_SOLID, m.is_clear_solid());
+    flags.set(MaterialFlags::BACKED, m.backed);
+    flags.bits()
 }
 
 fn texture_ref(scene: &Scene, first_texels: &[u32], reference: &scene::TextureRef) -> TextureRef {
-    use texture_flags::{DEEP, NEAREST, SECOND_UV_SET, SRGB, WRAP_U_SHIFT, WRAP_V_SHIFT};
     let texture = &scene.textures[reference.texture as usize];
     let image = &scene.images[texture.image as usize];
     let is_empty = image.texels.is_empty();
     let transform = reference.transform;
-    let mut flags = wrap_code(texture.wrap_u) << WRAP_U_SHIFT;
-    flags |= wrap_code(texture.wrap_v) << WRAP_V_SHIFT;
-    flags |= if reference.uv_set == 1 { SECOND_UV_SET } else { 0 };
-    flags |= if texture.nearest { NEAREST } else { 0 };
-    flags |= if texture.srgb { SRGB } else { 0 };
-    flags |= if image.texels.is_deep() { DEEP } else { 0 };
+    let mut flags = TextureFlags::empty();
+    flags.set(TextureFlags::SECOND_UV_SET, reference.uv_set == 1);
+    flags.set(TextureFlags::NEAREST, texture.nearest);
+    flags.set(TextureFlags::SRGB, texture.srgb);
+    flags.set(TextureFlags::DEEP, image.texels.is_deep());
+    let wrap = (texture.wrap_u as u32) << WRAP_U_SHIFT | (texture.wrap_v as u32) << WRAP_V_SHIFT;
     TextureRef {
         first_texel: first_texels[texture.image as usize],
         width: if is_empty { 0 } else { image.width },
         height: image.height,
-        flags,
+        flags: flags.bits() | wrap,
         matrix: transform.matrix2.to_cols_array().into(),
         translation: transform.translation,
         padding: Vec2::ZERO,
-    }
-}
-
-fn wrap_code(wrap: Wrap) -> u32 {
-    match wrap {
-        Wrap::Repeat => 0,
-        Wrap::MirroredRepeat => 1,
-        Wrap::ClampToEdge => 2,
     }
 }
 

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use super::constants;
 use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
+use super::layout::{MaterialFlags, TextureFlags};
 use super::texels::{SlotTexels, VertexTexels};
 use crate::path::sharing::SharedTile;
 use crate::scene::needs::SceneFeatures;
@@ -212,6 +213,10 @@ impl Program {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
         };
+        let of_materials =
+            MaterialFlags::all().iter_names().map(|(name, flag)| (name, flag.bits()));
+        let of_textures = TextureFlags::all().iter_names().map(|(name, flag)| (name, flag.bits()));
+        declare(&of_materials.chain(of_textures).collect::<Vec<_>>());
         declare(&[
             ("STACK_SIZE", constants.stack_size),
             ("SHARED_STACK_SIZE", constants.shared_stack_size),
