@@ -39,14 +39,9 @@ impl AdapterFacts {
 
     /// Discrete before integrated before the rest; Vulkan and Metal before DX12, whose old compiler takes long for our
     /// kernels, before OpenGL.
-    fn rank(&self) -> (u32, u32) {
-        let kind = match self.kind {
-            "discrete" => 0,
-            "integrated" => 1,
-            "virtual" => 2,
-            "other" => 3,
-            _ => 4,
-        };
+    fn rank(&self) -> (Option<usize>, u32) {
+        const KINDS: [&str; 5] = ["discrete", "integrated", "virtual", "other", "software"];
+        let kind = KINDS.iter().position(|kind| *kind == self.kind);
         let backend = match self.backend.as_str() {
             "OpenGL" => 2,
             "Dx12" => 1,
