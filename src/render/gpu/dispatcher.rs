@@ -91,20 +91,22 @@ impl Dispatcher {
     /// Uploads the small tables of numbers; says where each begins.
     fn put_tables(&mut self, view: &View, environment: &Environment) -> Result<()> {
         let Self { buffers, constants, features, .. } = self;
-        let mut texels = albedo::texels();
-        constants.sheen_at = texels.len() as u32;
-        if features.scene.contains(SceneFeatures::SHEEN) {
-            texels.extend(sheen::texels());
-        }
-        constants.rescatter_at = texels.len() as u32;
-        if features.scene.contains(SceneFeatures::ROUGH_GLASS) {
-            texels.extend(rescatter::texels());
-        }
-        constants.filter_at = texels.len() as u32;
+        let needed = |feature, table: fn() -> Vec<[f32; 4]>| {
+            if features.scene.contains(feature) { table() } else { Vec::new() }
+        };
         let sums = view.filter.cumulative().into_iter().flatten();
-        texels.extend(sums.map(|&sum| [sum, 0.0, 0.0, 0.0]));
-        constants.rows_at = texels.len() as u32;
-        texels.extend(layout::map_rows(environment));
+        let tables = [
+            albedo::texels(),
+            needed(SceneFeatures::SHEEN, sheen::texels),
+            needed(SceneFeatures::ROUGH_GLASS, rescatter::texels),
+            sums.map(|&sum| [sum, 0.0, 0.0, 0.0]).collect(),
+            layout::map_rows(environment).collect(),
+        ];
+        let mut texels = Vec::new();
+        for (at, table) in constants.tables_at.iter_mut().zip(tables) {
+            *at = texels.len() as u32;
+            texels.extend(table);
+        }
         put_array(buffers, "tables", "the list of constants", &texels)
     }
 

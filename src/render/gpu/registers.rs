@@ -147,11 +147,7 @@ fn program_of(world: &World, kernel: Kernel, features: Features) -> Program {
         shared_stack_size: SHARED_STACK_SIZE,
         vertex: VertexTexels::of(features),
         textures_in_scene: world.needs.texture_slots,
-        albedo_at: 0,
-        sheen_at: 4096,
-        rescatter_at: 8192,
-        filter_at: 12288,
-        rows_at: 16384,
+        tables_at: [0, 4096, 8192, 12288, 16384],
         metres: 1.0_f32.to_bits(),
         shared_tile: None,
     };

@@ -14,6 +14,9 @@ use super::texels::{SlotTexels, VertexTexels};
 use crate::path::sharing::SharedTile;
 use crate::scene::needs::SceneFeatures;
 
+/// Shaders' names of where each table of numbers begins: those of scattering, the pixel filter's, the map's rows.
+const TABLES: [&str; 5] = ["ALBEDO_AT", "SHEEN_AT", "RESCATTER_AT", "FILTER_AT", "ROWS_AT"];
+
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Constants {
@@ -24,12 +27,8 @@ pub(crate) struct Constants {
     pub(crate) vertex: VertexTexels,
     /// Bit `i`: some material has the `i`-th of the textures a material can have.
     pub(crate) textures_in_scene: u32,
-    /// Texels of `tables` at which each begins.
-    pub(crate) albedo_at: u32,
-    pub(crate) sheen_at: u32,
-    pub(crate) rescatter_at: u32,
-    pub(crate) filter_at: u32,
-    pub(crate) rows_at: u32,
+    /// Texels of `tables` at which each of `TABLES` begins.
+    pub(crate) tables_at: [u32; 5],
     /// Bits of the length of the scene's unit in metres of its file.
     pub(crate) metres: u32,
     /// How pixels share, if they do.
@@ -225,23 +224,12 @@ impl Program {
             ("TANGENT_TEXEL", constants.vertex.tangent),
             ("COLOR_TEXEL", constants.vertex.color),
             ("TEXTURES_IN_SCENE", constants.textures_in_scene),
-            ("ALBEDO_AT", constants.albedo_at),
-            ("SHEEN_AT", constants.sheen_at),
-            ("RESCATTER_AT", constants.rescatter_at),
-            ("FILTER_AT", constants.filter_at),
-            ("ROWS_AT", constants.rows_at),
         ]);
+        declare(&std::array::from_fn::<_, 5, _>(|i| (TABLES[i], constants.tables_at[i])));
         if kernel.keeps_paths() {
             let slot = SlotTexels::of(features);
-            declare(&[
-                ("SLOT_TEXELS", slot.count),
-                ("RECEIVER_TEXEL", slot.receiver),
-                ("BODY_TEXEL", slot.body),
-                ("FIRST_HIT_TEXEL", slot.first_hit),
-                ("MAP_SHADOW_TEXEL", slot.map_shadow),
-                ("LAMP_SHADOW_TEXEL", slot.lamp_shadow),
-                ("DEPARTURE_TEXEL", slot.departure),
-            ]);
+            declare(&[("SLOT_TEXELS", slot.count)]);
+            declare(&slot.parts);
         }
         if kernel.shares() {
             let SharedTile { side, owner_side, continuations, map_samples } =

@@ -31,12 +31,8 @@ impl VertexTexels {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SlotTexels {
     pub(crate) count: u32,
-    pub(super) receiver: u32,
-    pub(super) body: u32,
-    pub(super) first_hit: u32,
-    pub(super) map_shadow: u32,
-    pub(super) lamp_shadow: u32,
-    pub(super) departure: u32,
+    /// Shaders' names of the parts that not all have, and the texel at which each begins.
+    pub(super) parts: [(&'static str, u32); 6],
 }
 
 impl SlotTexels {
@@ -48,18 +44,21 @@ impl SlotTexels {
             at
         };
         let body_texels = if view.contains(ViewFeatures::MEDIUM) { 2 } else { 1 };
-        let receiver = next(scene.contains(SceneFeatures::EMITTERS), 2);
-        let body = next(scene.contains(SceneFeatures::SOLID_TRANSMISSION), body_texels);
         let looks = if scene.contains(SceneFeatures::PERFECT_INTERFACES) { 4 } else { 2 };
-        let first_hit = next(view.contains(ViewFeatures::LAYERS), looks);
         // What is asked for where a ray meets glass.
         let is_clear = scene.contains(SceneFeatures::CLEAR_SOLIDS);
         let [of_map, of_lamp] = if is_clear { [6, 8] } else { [4, 4] };
         // Paths behind second vertices follow their shadows at once.
         let waits = |light| view.contains(light) && !kernel.contains(KernelFeatures::SHARING);
-        let map_shadow = next(waits(ViewFeatures::MAP_SAMPLING), of_map);
-        let lamp_shadow = next(waits(ViewFeatures::LOCAL_LIGHTS), of_lamp);
-        let departure = next(is_clear, 2);
-        Self { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure }
+        let is_solid = scene.contains(SceneFeatures::SOLID_TRANSMISSION);
+        let parts = [
+            ("RECEIVER_TEXEL", next(scene.contains(SceneFeatures::EMITTERS), 2)),
+            ("BODY_TEXEL", next(is_solid, body_texels)),
+            ("FIRST_HIT_TEXEL", next(view.contains(ViewFeatures::LAYERS), looks)),
+            ("MAP_SHADOW_TEXEL", next(waits(ViewFeatures::MAP_SAMPLING), of_map)),
+            ("LAMP_SHADOW_TEXEL", next(waits(ViewFeatures::LOCAL_LIGHTS), of_lamp)),
+            ("DEPARTURE_TEXEL", next(is_clear, 2)),
+        ];
+        Self { count, parts }
     }
 }
