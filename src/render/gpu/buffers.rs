@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{Buffer, BufferUsages, TextureUsages as Usages};
 
 use super::buffer::{buffer, texture};
 use super::device::Gpu;
-use super::shader::{ARRAYS, ArrayKind, ArrayPlaces, TexelFormat};
+use super::shader::{ARRAYS, ArrayPlaces};
 use crate::error::{Error, Result};
 
 /// Everything the kernels bind, by the name of its variable. Clones share what was made before.
@@ -115,7 +115,7 @@ impl Buffers {
         parts: impl Iterator<Item = Cow<'b, [u8]>>,
     ) -> Result<()> {
         let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
-        let bytes = texels * kind.format.bytes();
+        let bytes = texels * kind.texel_bytes();
         // A kernel may have been made for distributions in a buffer.
         if self.gpu.prefers_buffers && (bytes <= self.most_bytes() || name == "distributions") {
             self.arrays.remove(name);
@@ -139,15 +139,17 @@ impl Buffers {
         if rows > u64::from(most) {
             return Err(Error::new(format!(
                 "{what} takes {} MiB; {} allows {} MiB for it",
-                (texels * kind.format.bytes()) >> 20,
+                (texels * kind.texel_bytes()) >> 20,
                 self.gpu.facts().name,
-                (width * u64::from(most) * kind.format.bytes()) >> 20
+                (width * u64::from(most) * kind.texel_bytes()) >> 20
             )));
         }
-        let bytes = rows * width * kind.format.bytes();
-        let texture = self.gpu.make(|device| create_array(device, kind, width as u32, rows as u32));
+        let bytes = rows * width * kind.texel_bytes();
+        let (size, usage) =
+            ([width as u32, rows as u32], Usages::TEXTURE_BINDING | Usages::COPY_DST);
+        let texture = self.gpu.make(|device| texture(device, Some(name), size, kind.format, usage));
         let texture = texture.map_err(|e| for_want_of(bytes, what, &e))?;
-        self.upload(&texture, kind.format.bytes(), parts)?;
+        self.upload(&texture, kind.texel_bytes(), parts)?;
         self.by_name.remove(name);
         self.arrays.insert(name, (texture, bytes));
         self.version += 1;
@@ -281,16 +283,4 @@ impl Buffers {
 /// What is said if so many bytes could not be had.
 fn for_want_of(bytes: u64, what: &str, error: &Error) -> Error {
     Error::new(format!("{error} ({what} takes {} MiB)", bytes.div_ceil(1 << 20)))
-}
-
-fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {
-    let format = match kind.format {
-        TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
-        TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
-        TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
-        TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
-        TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
-    };
-    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-    texture(device, Some(kind.name), [width, height], format, usage)
 }

@@ -127,7 +127,7 @@ fn binding_type(binding: &Binding) -> wgpu::BindingType {
         },
         Binding::Tree => wgpu::BindingType::AccelerationStructure { vertex_return: false },
         Binding::Array(array) => wgpu::BindingType::Texture {
-            sample_type: if array.format.is_float() {
+            sample_type: if array.is_float() {
                 wgpu::TextureSampleType::Float { filterable: false }
             } else {
                 wgpu::TextureSampleType::Uint

@@ -6,6 +6,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use wgpu::TextureFormat;
+
 use super::constants;
 use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
@@ -61,74 +63,59 @@ impl Default for ArrayPlaces {
 pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
     pub(crate) name: &'static str,
-    pub(crate) format: TexelFormat,
-}
-
-/// What a texel holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TexelFormat {
-    Words1,
-    Words2,
-    Words4,
-    Floats4,
-    Bytes4,
-}
-
-impl TexelFormat {
-    /// Bytes of a texel.
-    pub(crate) fn bytes(self) -> u64 {
-        match self {
-            Self::Words1 | Self::Bytes4 => 4,
-            Self::Words2 => 8,
-            Self::Words4 | Self::Floats4 => 16,
-        }
-    }
-
-    /// Type of an element in a storage buffer, and what makes a vector of an element `e`.
-    fn in_buffer(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Words1 => ("array<u32>", "vec4u(e, 0u, 0u, 0u)"),
-            Self::Words2 => ("array<vec2u>", "vec4u(e, 0u, 0u)"),
-            Self::Words4 => ("array<vec4u>", "e"),
-            Self::Floats4 => ("array<vec4f>", "e"),
-            Self::Bytes4 => ("array<u32>", "unpack4x8unorm(e)"),
-        }
-    }
-
-    /// Whether shaders see floats.
-    pub(crate) fn is_float(self) -> bool {
-        matches!(self, Self::Floats4 | Self::Bytes4)
-    }
+    /// What a texel holds: one of those that `ARRAYS` has.
+    pub(crate) format: TextureFormat,
 }
 
 /// All arrays.
 pub(crate) const ARRAYS: [ArrayKind; 17] = {
-    use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
-    const fn array(name: &'static str, format: TexelFormat) -> ArrayKind {
+    use TextureFormat::{R32Uint, Rg32Uint, Rgba8Unorm, Rgba32Float, Rgba32Uint};
+    const fn array(name: &'static str, format: TextureFormat) -> ArrayKind {
         ArrayKind { name, format }
     }
     [
-        array("bvh_nodes", Words4),
-        array("bvh_triangles", Words4),
-        array("query_triangles", Words1),
-        array("triangles", Words4),
-        array("vertices", Words4),
-        array("instances", Words4),
-        array("instance_slots", Words1),
-        array("materials", Words4),
-        array("tables", Floats4),
-        array("texture_refs", Words4),
-        array("texels", Bytes4),
-        array("map_texels", Words2),
-        array("sums", Words1),
-        array("distributions", Words1),
-        array("lights", Words1),
-        array("light_nodes", Words4),
-        array("cache_slots", Words4),
+        array("bvh_nodes", Rgba32Uint),
+        array("bvh_triangles", Rgba32Uint),
+        array("query_triangles", R32Uint),
+        array("triangles", Rgba32Uint),
+        array("vertices", Rgba32Uint),
+        array("instances", Rgba32Uint),
+        array("instance_slots", R32Uint),
+        array("materials", Rgba32Uint),
+        array("tables", Rgba32Float),
+        array("texture_refs", Rgba32Uint),
+        array("texels", Rgba8Unorm),
+        array("map_texels", Rg32Uint),
+        array("sums", R32Uint),
+        array("distributions", R32Uint),
+        array("lights", R32Uint),
+        array("light_nodes", Rgba32Uint),
+        array("cache_slots", Rgba32Uint),
     ]
 };
 
 impl ArrayKind {
+    /// Bytes of a texel.
+    pub(crate) fn texel_bytes(&self) -> u64 {
+        self.format.block_copy_size(None).map_or(4, u64::from)
+    }
+
+    /// Type of an element in a storage buffer, and what makes a vector of an element `e`.
+    fn in_buffer(&self) -> (&'static str, &'static str) {
+        match self.format {
+            TextureFormat::R32Uint => ("array<u32>", "vec4u(e, 0u, 0u, 0u)"),
+            TextureFormat::Rg32Uint => ("array<vec2u>", "vec4u(e, 0u, 0u)"),
+            TextureFormat::Rgba32Uint => ("array<vec4u>", "e"),
+            TextureFormat::Rgba32Float => ("array<vec4f>", "e"),
+            _ => ("array<u32>", "unpack4x8unorm(e)"),
+        }
+    }
+
+    /// Whether shaders see floats.
+    pub(crate) fn is_float(&self) -> bool {
+        matches!(self.format, TextureFormat::Rgba32Float | TextureFormat::Rgba8Unorm)
+    }
+
     /// Whether kernels with these features read it.
     fn is_needed(&self, features: Features) -> bool {
         let Features { scene, view, .. } = features;
@@ -147,10 +134,10 @@ impl ArrayKind {
 
     /// The declaration and the function that reads an element.
     fn accessor(&self, binding: usize, places: &ArrayPlaces) -> String {
-        let Self { name, format, .. } = self;
-        let scalar = if format.is_float() { "f32" } else { "u32" };
+        let Self { name, .. } = self;
+        let scalar = if self.is_float() { "f32" } else { "u32" };
         let (declaration, reading) = if places.in_buffers.contains(name) {
-            let (store, element) = format.in_buffer();
+            let (store, element) = self.in_buffer();
             let reading = format!("let e = {name}_buffer[index];\n    return {element};");
             (format!("var<storage, read> {name}_buffer: {store}"), reading)
         } else {
@@ -371,7 +358,7 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
     let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(|array| {
         if places.in_buffers.contains(array.name) {
-            let (store, _) = array.format.in_buffer();
+            let (store, _) = array.in_buffer();
             Binding::Buffer { name: array.name, store, is_written: false }
         } else {
             Binding::Array(array)

@@ -187,6 +187,6 @@ pub(super) fn put_array<T: bytemuck::Pod>(
 ) -> Result<()> {
     let bytes: &[u8] = bytemuck::cast_slice(values);
     let texel_bytes = shader::ARRAYS.iter().find(|kind| kind.name == name);
-    let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.format.bytes());
+    let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.texel_bytes());
     buffers.put_array(name, what, texels, std::iter::once(Cow::Borrowed(bytes)))
 }
