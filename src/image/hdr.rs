@@ -16,15 +16,15 @@ use glam::{DVec2, Mat3, Vec3};
 /// The cause, without the file's name: no Radiance header, an unknown pixel format or resolution
 /// line, an implausible size, damaged or missing rows.
 pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
-    let mut cursor = Cursor { rest: bytes };
+    let mut rest = bytes;
     let mut notices = Notices::default();
-    let header = Header::parse(&mut cursor, &mut notices)?;
+    let header = Header::parse(&mut rest, &mut notices)?;
     let (major, minor) = (header.major, header.minor);
     // A row takes four bytes at the very least.
-    if (cursor.rest.len() as u64) < 4 * major.count {
+    if (rest.len() as u64) < 4 * major.count {
         return Err(format!(
             "is cut short: {} bytes cannot hold {} x {} pixels",
-            cursor.rest.len(),
+            rest.len(),
             header.width(),
             header.height()
         ));
@@ -35,14 +35,14 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
     // All at once if the file can hold it in runs, else as it is read: old runs have no bound, and a
     // small file may claim gigabytes.
     let total = major.count as usize * minor.count as usize;
-    if total / MAX_PIXELS_PER_BYTE <= cursor.rest.len() {
+    if total / MAX_PIXELS_PER_BYTE <= rest.len() {
         pixels = memory::reserved(total as u64)?;
     }
     // Whoever writes runs needs less than four bytes a pixel. If there are as many, pixels that look like
     // runs of the old kind are dark pixels.
-    let may_have_runs = starts_with_runs(cursor.rest, line.len()) || cursor.rest.len() < 4 * total;
+    let may_have_runs = starts_with_runs(rest, line.len()) || rest.len() < 4 * total;
     for row in 0..major.count {
-        read_line(&mut cursor, &mut line, may_have_runs)
+        read_line(&mut rest, &mut line, may_have_runs)
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
@@ -91,15 +91,15 @@ struct Header {
 }
 
 impl Header {
-    fn parse(cursor: &mut Cursor<'_>, notices: &mut Notices) -> Decoded<Self> {
-        if !cursor.line().is_some_and(|line| line.starts_with("#?")) {
+    fn parse(rest: &mut &[u8], notices: &mut Notices) -> Decoded<Self> {
+        if !text_line(rest).is_some_and(|line| line.starts_with("#?")) {
             return Err("is not a Radiance picture: it does not begin with #?".into());
         }
         let mut is_xyz = false;
         let mut exposure = [1.0f64; 3];
         let mut primaries = None;
         loop {
-            let line = cursor.line().ok_or("ends within its header")?;
+            let line = text_line(rest).ok_or("ends within its header")?;
             if line.is_empty() {
                 break;
             }
@@ -135,7 +135,7 @@ impl Header {
                 _ => {}
             }
         }
-        let line = cursor.line().ok_or("has no resolution line")?;
+        let line = text_line(rest).ok_or("has no resolution line")?;
         let (major, minor) = parse_resolution(&line)?;
         Ok(Self { is_xyz, exposure, primaries, major, minor })
     }
@@ -227,27 +227,18 @@ impl PixelDecoder {
     }
 }
 
-/// What is left of the file.
-struct Cursor<'a> {
-    rest: &'a [u8],
+/// The next line of text without its end (LF or CR LF); `None` at the end of the file or if it is too
+/// long to be text.
+fn text_line(rest: &mut &[u8]) -> Option<String> {
+    const MAX_LINE: usize = 1 << 16;
+    let end = rest.iter().take(MAX_LINE).position(|&b| b == b'\n')?;
+    let line = &rest.split_off(..=end)?[..end];
+    Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
 }
 
-impl<'a> Cursor<'a> {
-    /// The next line without its end (LF or CR LF); `None` at the end of the file or if it is too
-    /// long to be text.
-    fn line(&mut self) -> Option<String> {
-        const MAX_LINE: usize = 1 << 16;
-        let end = self.rest.iter().take(MAX_LINE).position(|&b| b == b'\n')?;
-        let line = &self.rest[..end];
-        self.rest = &self.rest[end + 1..];
-        Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
-    }
-
-    fn take(&mut self, count: usize) -> Decoded<&'a [u8]> {
-        let (taken, rest) = self.rest.split_at_checked(count).ok_or("is cut short")?;
-        self.rest = rest;
-        Ok(taken)
-    }
+/// Takes so many bytes off what is left of the file.
+fn take<'a>(rest: &mut &'a [u8], count: usize) -> Decoded<&'a [u8]> {
+    rest.split_off(..count).ok_or_else(|| "is cut short".into())
 }
 
 /// Whether a line of `width` pixels begins here that is written in runs of the new kind.
@@ -258,33 +249,33 @@ fn starts_with_runs(rest: &[u8], width: usize) -> bool {
 
 /// Reads one line of pixels: each by itself or, if there may be runs, in runs of the new kind, of the old one or
 /// without any.
-fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], may_have_runs: bool) -> Decoded<()> {
+fn read_line(rest: &mut &[u8], line: &mut [[u8; 4]], may_have_runs: bool) -> Decoded<()> {
     if !may_have_runs {
-        line.copy_from_slice(cursor.take(4 * line.len())?.as_chunks().0);
+        line.copy_from_slice(take(rest, 4 * line.len())?.as_chunks().0);
         Ok(())
-    } else if starts_with_runs(cursor.rest, line.len()) {
-        cursor.take(4)?;
-        (0..4).try_for_each(|channel| read_runs(cursor, line, channel))
+    } else if starts_with_runs(rest, line.len()) {
+        take(rest, 4)?;
+        (0..4).try_for_each(|channel| read_runs(rest, line, channel))
     } else {
-        read_flat_or_old_runs(cursor, line)
+        read_flat_or_old_runs(rest, line)
     }
 }
 
 /// One channel of a run-length encoded line: a count above 128 repeats one byte, others copy.
-fn read_runs(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], channel: usize) -> Decoded<()> {
+fn read_runs(rest: &mut &[u8], line: &mut [[u8; 4]], channel: usize) -> Decoded<()> {
     let mut filled = 0;
     while filled < line.len() {
-        let code = cursor.take(1)?[0];
+        let code = take(rest, 1)?[0];
         let count = usize::from(if code > 128 { code - 128 } else { code });
         let pixels = line
             .get_mut(filled..filled + count)
             .filter(|_| count > 0)
             .ok_or("has a damaged row")?;
         if code > 128 {
-            let value = cursor.take(1)?[0];
+            let value = take(rest, 1)?[0];
             pixels.iter_mut().for_each(|pixel| pixel[channel] = value);
         } else {
-            let values = cursor.take(count)?;
+            let values = take(rest, count)?;
             pixels.iter_mut().zip(values).for_each(|(pixel, &value)| pixel[channel] = value);
         }
         filled += count;
@@ -294,11 +285,11 @@ fn read_runs(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], channel: usize) -> D
 
 /// Plain pixels, where `1 1 1 n` repeats the last one `n` times; runs in a row are the digits of
 /// one count, base 256, lowest first.
-fn read_flat_or_old_runs(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]]) -> Decoded<()> {
+fn read_flat_or_old_runs(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Decoded<()> {
     let mut filled = 0;
     let mut shift = 0;
     while filled < line.len() {
-        let pixel: [u8; 4] = cursor.take(4)?.try_into().expect("four bytes were taken");
+        let pixel: [u8; 4] = take(rest, 4)?.try_into().expect("four bytes were taken");
         if let [1, 1, 1, digit] = pixel
             && filled > 0
         {
