@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::copies::bits;
 use super::instances::Surface;
-use super::{AlphaMode, Instance, Material, Scene};
+use super::{Instance, Material, Scene};
 use crate::bvh::offset_origin;
 
 /// Faces that are so many jumps of a ray's origin apart are both met: a jump, and what it is to outweigh, which is
@@ -94,7 +94,8 @@ impl Scene {
     ///
     /// After [`Self::pair_backs`], which looks for faces in the same place.
     pub(crate) fn part_flush_faces(&mut self) {
-        let is_passing: Vec<bool> = self.materials.iter().map(lets_light_through).collect();
+        let is_passing: Vec<bool> =
+            self.materials.iter().map(Material::lets_light_through).collect();
         let kind = |place: usize| is_passing[self.triangle_materials[place] as usize];
         let has = |passing: bool| {
             (0..self.triangles.len()).into_par_iter().any(|place| kind(place) == passing)
@@ -292,12 +293,6 @@ impl Scene {
     }
 }
 
-fn lets_light_through(material: &Material) -> bool {
-    material.alpha_mode != AlphaMode::Opaque
-        || material.transmission > 0.0
-        || material.diffuse_transmission > 0.0
-}
-
 /// How far [`offset_origin`] moves points along a normal, given how far they are from zero along each axis at most.
 fn jump(farthest: Vec3, normal: Vec3) -> f64 {
     // Near zero it moves them as far as at 1/2, and less in between.
@@ -341,7 +336,7 @@ mod tests {
     use glam::{DAffine3, Quat};
 
     use super::*;
-    use crate::scene::{Instances, Placing, builtin};
+    use crate::scene::{AlphaMode, Instances, Placing, builtin};
 
     const WALL: u32 = 0;
     const BLEND: u32 = 1;

@@ -177,6 +177,13 @@ impl Material {
         (self.transmission > 0.0 || self.diffuse_transmission > 0.0) && self.thickness > 0.0
     }
 
+    /// Whether what lies behind it can be seen, in part or through and through.
+    pub(super) fn lets_light_through(&self) -> bool {
+        self.alpha_mode != AlphaMode::Opaque
+            || self.transmission > 0.0
+            || self.diffuse_transmission > 0.0
+    }
+
     /// Whether it is a solid whose surface only reflects and refracts, and whose inside only absorbs, each in one
     /// way whatever the wavelength.
     pub fn is_clear_solid(&self) -> bool {

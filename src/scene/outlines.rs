@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::instances::Surface;
-use super::{AlphaMode, Material, MaterialEdit, Scene};
+use super::{Material, MaterialEdit, Scene};
 use crate::error::Decoded;
 
 /// Triangles of a material that are looked at.
@@ -43,10 +43,7 @@ struct Shape {
 /// materials there are.
 fn inward_shapes(scene: &Scene) -> Vec<Option<Shape>> {
     let shape = |material: &Material| {
-        let lets_light_through = material.transmission > 0.0 || material.diffuse_transmission > 0.0;
-        let may_be = !material.double_sided
-            && material.alpha_mode == AlphaMode::Opaque
-            && !lets_light_through;
+        let may_be = !material.double_sided && !material.lets_light_through();
         may_be.then_some(Shape { low: Vec3::MAX, high: Vec3::MIN, count: 0, volume: 0.0 })
     };
     let mut shapes: Vec<Option<Shape>> = scene.materials.iter().map(shape).collect();
@@ -71,6 +68,9 @@ fn inward_shapes(scene: &Scene) -> Vec<Option<Shape>> {
     shapes.into_iter().map(|shape| shape.filter(|shape| shape.volume < 0.0)).collect()
 }
 
+/// How distances are compared.
+type Compare = fn(&f32, &f32) -> bool;
+
 /// All triangles in order along the axis in which they spread most.
 struct Row {
     axis: usize,
@@ -89,29 +89,24 @@ impl Row {
     }
 
     /// The nearest triangle of another material that is at most `reach` away; the first of those as near.
-    fn nearest(&self, of: &Facing, reach: f32) -> Option<&Facing> {
+    fn nearest<'a>(&'a self, of: &Facing, reach: f32) -> Option<&'a Facing> {
         let along = |other: &Facing| other.centre[self.axis] - of.centre[self.axis];
         let (before, after) =
             self.facings.split_at(self.facings.partition_point(|other| along(other) < 0.0));
         let mut nearest = (reach * reach, None);
-        for other in before.iter().rev() {
-            if along(other).powi(2) > nearest.0 {
-                break;
+        let mut search = |others: &mut dyn Iterator<Item = &'a Facing>, is_near: Compare| {
+            for other in others {
+                if !is_near(&along(other).powi(2), &nearest.0) {
+                    break;
+                }
+                let distance = of.centre.distance_squared(other.centre);
+                if other.material != of.material && is_near(&distance, &nearest.0) {
+                    nearest = (distance, Some(other));
+                }
             }
-            let distance = of.centre.distance_squared(other.centre);
-            if other.material != of.material && distance <= nearest.0 {
-                nearest = (distance, Some(other));
-            }
-        }
-        for other in after {
-            if along(other).powi(2) >= nearest.0 {
-                break;
-            }
-            let distance = of.centre.distance_squared(other.centre);
-            if other.material != of.material && distance < nearest.0 {
-                nearest = (distance, Some(other));
-            }
-        }
+        };
+        search(&mut before.iter().rev(), f32::le);
+        search(&mut after.iter(), f32::lt);
         nearest.1
     }
 }
