@@ -150,9 +150,7 @@ pub(super) fn deviation(found: Mean, expected: f64, rounding: f64) -> f64 {
 
 /// Difference of two means, in joint standard errors.
 pub(super) fn difference(a: Mean, b: Mean) -> f64 {
-    let off = (a.luminance - b.luminance).abs();
-    let error = a.error.hypot(b.error).hypot(ROUNDING * a.luminance);
-    if off == 0.0 { 0.0 } else { off / error }
+    deviation(Mean { error: a.error.hypot(b.error), ..b }, a.luminance, ROUNDING)
 }
 
 /// Relative rounding error of a mean: ray origins are moved by 2^-16.
