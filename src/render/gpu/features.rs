@@ -104,7 +104,8 @@ pub(super) fn check(view: &View) -> Result<()> {
     Err(Error::new(format!("{what} for the CPU alone")))
 }
 
-type Condition = fn(&Features) -> bool;
+/// What can be asked of features.
+pub(super) type Condition = fn(&Features) -> bool;
 
 /// What follows from the others, by name.
 const DERIVED: [(&str, Condition); 13] = {

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use wgpu::TextureFormat;
 
 use super::constants;
-use super::features::{Features, ViewFeatures};
+use super::features::{Condition, Features, ViewFeatures};
 use super::kernel::Kernel;
 use super::layout::{MaterialFlags, TextureFlags};
 use super::texels::{SlotTexels, VertexTexels};
@@ -59,38 +59,41 @@ impl Default for ArrayPlaces {
 }
 
 /// A read-only array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
     pub(crate) name: &'static str,
     /// What a texel holds: one of those that `ARRAYS` has.
     pub(crate) format: TextureFormat,
+    /// Whether kernels with given features read it.
+    is_needed: Condition,
 }
 
 /// All arrays.
 pub(crate) const ARRAYS: [ArrayKind; 17] = {
     use TextureFormat::{R32Uint, Rg32Uint, Rgba8Unorm, Rgba32Float, Rgba32Uint};
-    const fn array(name: &'static str, format: TextureFormat) -> ArrayKind {
-        ArrayKind { name, format }
+    use {SceneFeatures as S, ViewFeatures as V};
+    const fn array(name: &'static str, format: TextureFormat, is_needed: Condition) -> ArrayKind {
+        ArrayKind { name, format, is_needed }
     }
     [
-        array("bvh_nodes", Rgba32Uint),
-        array("bvh_triangles", Rgba32Uint),
-        array("query_triangles", R32Uint),
-        array("triangles", Rgba32Uint),
-        array("vertices", Rgba32Uint),
-        array("instances", Rgba32Uint),
-        array("instance_slots", R32Uint),
-        array("materials", Rgba32Uint),
-        array("tables", Rgba32Float),
-        array("texture_refs", Rgba32Uint),
-        array("texels", Rgba8Unorm),
-        array("map_texels", Rg32Uint),
-        array("sums", R32Uint),
-        array("distributions", R32Uint),
-        array("lights", R32Uint),
-        array("light_nodes", Rgba32Uint),
-        array("cache_slots", Rgba32Uint),
+        array("bvh_nodes", Rgba32Uint, Features::software_walk),
+        array("bvh_triangles", Rgba32Uint, Features::software_walk),
+        array("query_triangles", R32Uint, |f| !f.software_walk()),
+        array("triangles", Rgba32Uint, |_| true),
+        array("vertices", Rgba32Uint, |_| true),
+        array("instances", Rgba32Uint, |f| f.scene.contains(S::INSTANCES)),
+        array("instance_slots", R32Uint, |f| f.scene.contains(S::INSTANCES)),
+        array("materials", Rgba32Uint, |_| true),
+        array("tables", Rgba32Float, |_| true),
+        array("texture_refs", Rgba32Uint, |f| f.scene.contains(S::TEXTURES)),
+        array("texels", Rgba8Unorm, |f| f.scene.contains(S::TEXTURES)),
+        array("map_texels", Rg32Uint, |f| f.view.contains(V::MAP)),
+        array("sums", R32Uint, |f| f.view.contains(V::MAP_SAMPLING)),
+        array("distributions", R32Uint, |f| f.view.contains(V::MAP_SAMPLING)),
+        array("lights", R32Uint, Features::scene_lights),
+        array("light_nodes", Rgba32Uint, Features::scene_lights),
+        array("cache_slots", Rgba32Uint, |f| f.view.contains(V::RADIANCE_CACHE)),
     ]
 };
 
@@ -116,22 +119,6 @@ impl ArrayKind {
         matches!(self.format, TextureFormat::Rgba32Float | TextureFormat::Rgba8Unorm)
     }
 
-    /// Whether kernels with these features read it.
-    fn is_needed(&self, features: Features) -> bool {
-        let Features { scene, view, .. } = features;
-        match self.name {
-            "bvh_nodes" | "bvh_triangles" => features.software_walk(),
-            "query_triangles" => !features.software_walk(),
-            "instances" | "instance_slots" => scene.contains(SceneFeatures::INSTANCES),
-            "texture_refs" | "texels" => scene.contains(SceneFeatures::TEXTURES),
-            "map_texels" => view.contains(ViewFeatures::MAP),
-            "sums" | "distributions" => view.contains(ViewFeatures::MAP_SAMPLING),
-            "lights" | "light_nodes" => features.scene_lights(),
-            "cache_slots" => view.contains(ViewFeatures::RADIANCE_CACHE),
-            _ => true,
-        }
-    }
-
     /// The declaration and the function that reads an element.
     fn accessor(&self, binding: usize, places: &ArrayPlaces) -> String {
         let Self { name, .. } = self;
@@ -155,7 +142,7 @@ impl ArrayKind {
 }
 
 /// One binding of a kernel, in order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Binding {
     /// A buffer of this name.
     Buffer {
@@ -356,7 +343,7 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
         .into_iter()
         .filter(|(.., is_needed)| *is_needed)
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
-    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(|array| {
+    let arrays = ARRAYS.into_iter().filter(|array| (array.is_needed)(&features)).map(|array| {
         if places.in_buffers.contains(array.name) {
             let (store, _) = array.in_buffer();
             Binding::Buffer { name: array.name, store, is_written: false }
