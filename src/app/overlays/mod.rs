@@ -119,55 +119,42 @@ impl Sources<'_> {
         let facts = self.facts?;
         let cell_of = |spot: &Option<Spot>| spot.map(|s| all.cell_of(s.position, s.normal));
         let cells: Vec<Option<u32>> = surfaces.spots.iter().map(cell_of).collect();
-        let by_cell = |value: &dyn Fn(u32) -> Option<f32>, range: Range, unit| {
-            scaled(cells.iter().map(|cell| cell.and_then(value)), range, unit)
+        let distribution = |cell: u32| grid.distribution_of_cell(cell);
+        // The map may have been another one, of more tiles.
+        let tile = self.tile.filter(|tile| *tile < self.environment.tile_count());
+        let value = |cell: u32| match overlay {
+            Overlay::Visits => facts.visits(cell),
+            Overlay::Sky => facts.visible_share(cell),
+            Overlay::Entropy => Some(facts.entropy[distribution(cell) as usize]),
+            Overlay::Distance => Some(facts.distance[distribution(cell) as usize]),
+            _ => Some(grid.distributions().probability(distribution(cell), tile?))
+                .filter(|p| *p > 0.0),
         };
-        let distribution = |cell: u32| grid.distribution_of_cell(cell) as usize;
-        Some(match overlay {
-            Overlay::Cells => with_borders(&cells, surfaces.width, all),
-            Overlay::Faces => faces(&cells, all),
-            Overlay::Learned => learned(&cells, grid),
-            Overlay::Visits => {
-                by_cell(&|cell| facts.visits(cell), Range::Logarithmic, "tries a cell")
-            }
-            Overlay::Sky => by_cell(
-                &|cell| facts.visible_share(cell),
-                Range::Logarithmic,
-                "visibility times cosine",
-            ),
+        let (range, unit) = match overlay {
+            Overlay::Cells => return Some(with_borders(&cells, surfaces.width, all)),
+            Overlay::Faces => return Some(faces(&cells, all)),
+            Overlay::Learned => return Some(learned(&cells, grid)),
             Overlay::BestTile => {
                 let (columns, rows) = self.environment.tile_grid();
                 let color = |cell| {
-                    let tile = facts.best_tile[distribution(cell)];
+                    let tile = facts.best_tile[distribution(cell) as usize];
                     let u = (f64::from(tile % columns) + 0.5) / f64::from(columns);
                     let v = (f64::from(tile / columns) + 0.5) / f64::from(rows);
                     palette::of_map_place(u as f32, v as f32)
                 };
-                Painted::new(cells.iter().map(|cell| cell.map(color)).collect(), Legend::Map)
+                let colors = cells.iter().map(|cell| cell.map(color)).collect();
+                return Some(Painted::new(colors, Legend::Map));
             }
+            Overlay::Visits => (Range::Logarithmic, "tries a cell"),
+            Overlay::Sky => (Range::Logarithmic, "visibility times cosine"),
             Overlay::Entropy => {
                 let most = (self.environment.tile_count() as f32).log2();
-                by_cell(
-                    &|cell| Some(facts.entropy[distribution(cell)]),
-                    Range::Fixed(0.0, most),
-                    "bits",
-                )
+                (Range::Fixed(0.0, most), "bits")
             }
-            Overlay::Distance => by_cell(
-                &|cell| Some(facts.distance[distribution(cell)]),
-                Range::Fixed(0.0, 1.0),
-                "total variation",
-            ),
-            _ => {
-                // The map may have been another one, of more tiles.
-                let tile = self.tile.filter(|tile| *tile < self.environment.tile_count())?;
-                let probability = |cell| {
-                    Some(grid.distributions().probability(grid.distribution_of_cell(cell), tile))
-                        .filter(|p| *p > 0.0)
-                };
-                by_cell(&probability, Range::Logarithmic, "probability")
-            }
-        })
+            Overlay::Distance => (Range::Fixed(0.0, 1.0), "total variation"),
+            _ => tile.map(|_| (Range::Logarithmic, "probability"))?,
+        };
+        Some(scaled(cells.into_iter().map(|cell| cell.and_then(value)), range, unit))
     }
 }
 
