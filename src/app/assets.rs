@@ -66,6 +66,7 @@ impl Assets {
 
     /// Whether scene and map are there as the document wants them.
     pub(super) fn are_as_in(&self, document: &Document) -> bool {
+        let document = &*document.unmixed();
         self.scene_of(document).is_some_and(|scene| scene.is_edited_as(document))
             && self.map_of(document).is_some_and(|map| map.sun_factor == document.sun)
     }
@@ -84,6 +85,7 @@ impl Assets {
 
     /// Begins to load what the document wants and is not there.
     pub(super) fn load(&mut self, document: &Document) {
+        let document = &*document.unmixed();
         match self.scene.as_ref().filter(|scene| scene.name == document.scene) {
             None => self.loader.load_scene(&document.scene),
             Some(scene) if !scene.is_edited_as(document) => {
@@ -130,6 +132,7 @@ impl Assets {
 
     /// The map as the document turns and scales it; made anew only when that changes.
     pub(super) fn environment(&mut self, document: &Document) -> Option<Arc<Environment>> {
+        let document = &*document.unmixed();
         let map = &self.map.as_ref()?.environment;
         let (rotation_degrees, intensity) = (document.rotation_degrees, document.intensity);
         let is_current = self.transformed.as_ref().is_some_and(|transformed| {

@@ -1,6 +1,7 @@
 //! What the window shows, as plain data: undo compares it, the settings file keeps part of it, the
 //! worker's request follows from it.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::denoise::Denoiser;
 use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
+use crate::render::light_groups::LightFactors;
 use crate::render::{Crop, Sampling, Sharing, StopRule, View};
 use crate::scene::{
     Camera, LampEdit, LampEdits, Material, MaterialEdit, Medium, Projection, builtin,
@@ -34,6 +36,8 @@ with_defaults! {
         pub lamps: f32 = 1.0,
         /// Changes to these lights one by one.
         pub lamp_edits: LampEdits = LampEdits::new(),
+        /// Whether factors on light change the picture that there is, rather than begin a new one.
+        pub light_mix: bool = false,
         /// What the camera sees of the map.
         pub background: Background = Background::default(),
         /// Fog in place of the scene's own; `None` keeps that.
@@ -169,6 +173,27 @@ impl Document {
             && is_seen_alike
             && (&self.materials, &self.lamp_edits) == (&other.materials, &other.lamp_edits)
             && (light(self), things(self)) == (light(other), things(other))
+    }
+
+    /// The factors of its light mix, if it has one.
+    pub(super) fn mix(&self) -> Option<LightFactors> {
+        let Self { intensity, sun, lamps, ref lamp_edits, .. } = *self;
+        let is_mixed = self.light_mix && !self.light.split;
+        is_mixed.then(|| LightFactors { intensity, sun, lamps, lamp_edits: lamp_edits.clone() })
+    }
+
+    /// What is to be loaded and rendered: of a light mix all light as it is.
+    pub(super) fn unmixed(&self) -> Cow<'_, Self> {
+        if self.mix().is_none() {
+            return Cow::Borrowed(self);
+        }
+        let mut document = self.clone();
+        (document.intensity, document.sun, document.lamps) = (1.0, 1.0, 1.0);
+        for edit in document.lamp_edits.values_mut() {
+            *edit = LampEdit { color: edit.color, ..LampEdit::default() };
+        }
+        document.lamp_edits.retain(|_, edit| *edit != LampEdit::default());
+        Cow::Owned(document)
     }
 
     /// What it changes of the scene's file.

@@ -106,7 +106,7 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
     };
     // As it is shown. RGB of linear pictures is exact.
     let cached = snapshot.backdrop.as_ref().map(|cached| (&*cached.film, cached.worth));
-    let films = Films { film: record.film, cached, denoised: None };
+    let films = Films { film: record.film, cached, denoised: None, groups: &snapshot.groups };
     write_picture(path, &options, films, record.metadata())
 }
 
@@ -125,7 +125,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let document = &picture.document;
     let request = &picture.snapshot.request;
     let mut settings = settings_of(&request.view, &request.world);
-    let lamp_edits = picture.scene.changes.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
+    let lamp_edits = document.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
     let lamp_edits: Vec<String> = lamp_edits.collect();
     settings.extend([
         ("env_rotation_degrees", json!(document.rotation_degrees)),

@@ -17,6 +17,7 @@ use super::worker::{Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::error::Error;
 use crate::render::gpu::DeviceChoice;
+use crate::render::light_groups::MAX_LAMPS;
 use crate::sources;
 
 /// What helps where a room has no opening.
@@ -76,6 +77,10 @@ impl App {
             None => {}
         }
         forget_lamps(&mut self.edited, &scene, &mut self.messages);
+        if scene.named_lamps.len() > MAX_LAMPS && self.edited.document.light_mix {
+            self.messages.notice(format!("A light mix has room for {MAX_LAMPS} lamps; it is off"));
+            self.edited.put_back(|document| document.light_mix = false);
+        }
         self.assets.scene = Some(scene);
         fill_in_viewpoint(&mut self.edited, &self.assets, &mut self.messages);
         if is_first {
@@ -271,15 +276,22 @@ impl App {
         let world = Arc::clone(&self.assets.scene_of(document)?.world);
         let environment = self.assets.environment(document)?;
         let [width, height] = document.size.pixels(interface.viewport_pixels)?;
+        let mut view = document.view(width, height)?;
+        let (moving, mix) = (interface.is_moving(now) && !self.is_repeatable, document.mix());
+        if let Some(factors) = mix.as_ref().filter(|_| moving) {
+            view.local_lights = factors.local_lights(&world);
+        }
         Some(Request {
             world,
             environment,
-            view: document.view(width, height)?,
+            view,
             split: document.light.split,
-            moving: interface.is_moving(now) && !self.is_repeatable,
+            moving,
             previews: !self.is_repeatable,
             device: document.light.device,
-            wants_cached: document.look.denoise,
+            // What a mix trains is not kept.
+            wants_cached: document.look.denoise && !(moving && mix.is_some()),
+            mix,
             inspects_cache: interface.inspects_cache(),
             rule: document.stop,
             is_frozen: interface.is_frozen,

@@ -401,6 +401,54 @@ fn lamps_are_scaled_apart_from_the_map() {
     assert_eq!(candela(&mut studio, 2.0), 16.0);
 }
 
+/// Factors change the picture that there is, with the samples that it has, and are taken back like all else.
+#[test]
+fn a_light_mix_changes_the_picture_that_there_is() {
+    let Some(mut studio) = studio("evening") else { return };
+    studio.app.edited.document.stop.samples = Some(8);
+    studio.app.edited.document.light_mix = true;
+    studio.settle().expect("rendered");
+    let snapshot =
+        |studio: &Studio| Arc::clone(studio.app.rendering.snapshot.as_ref().expect("one"));
+    let first = snapshot(&studio);
+    let names: Vec<&str> = first.groups.iter().map(|group| &*group.name).collect();
+    assert_eq!(names, ["sky", "sun", "surfaces"]);
+    studio.app.edited.settle();
+    (studio.app.edited.document.intensity, studio.app.edited.document.sun) = (3.0, 0.5);
+    studio.settle().expect("rendered");
+    let second = snapshot(&studio);
+    let factors: Vec<f32> = second.groups.iter().map(|group| group.factor).collect();
+    assert_eq!(factors, [3.0, 1.5, 1.0]);
+    assert!(Arc::ptr_eq(&first.request.world, &second.request.world));
+    assert_eq!(first.main.figures, second.main.figures, "nothing was rendered");
+    let (image, expected) = (second.main.film.image(), &second.groups);
+    for (index, pixel) in image.pixels.iter().enumerate() {
+        let sum = expected.iter().map(|it| it.factor * it.image.pixels[index][0]).sum::<f32>();
+        assert!((pixel[0] - sum).abs() <= 1e-4 * sum, "{pixel:?} {sum}");
+    }
+    studio.asks(Command::Undo);
+    studio.settle().expect("rendered");
+    assert_eq!(snapshot(&studio).main.film.image().pixels, first.main.film.image().pixels);
+    assert_eq!(studio.app.edited.document.intensity, 1.0);
+    // What is saved has a layer of each.
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mix.exr");
+    studio.asks(Command::Save(path.clone()));
+    studio.frame().expect("drawn");
+    while !path.exists() {
+        studio.frame().expect("drawn");
+    }
+    let has = |name: &str| {
+        let bytes = std::fs::read(&path).expect("written");
+        bytes.windows(name.len()).any(|it| it == name.as_bytes())
+    };
+    assert!(has("light.sky.R") && has("light.surfaces.B"));
+    // Without it the same light begins anew.
+    studio.app.edited.document.light_mix = false;
+    studio.settle().expect("rendered");
+    assert!(snapshot(&studio).groups.is_empty());
+}
+
 #[test]
 fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
     let Some(mut studio) = studio("open") else { return };

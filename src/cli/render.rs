@@ -5,6 +5,7 @@ mod beside;
 mod frames;
 mod outputs;
 mod render_job;
+mod traced;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -25,10 +26,11 @@ use crate::image::exr_encoder_bytes;
 use crate::light_grid::LearningGrid;
 use crate::memory;
 use crate::output::record::{Phases, Record};
-use crate::output::{self, Exposure};
-use crate::path::World;
+use crate::output::{self, Exposure, Films};
+use crate::path::{Lit, World};
 use crate::render::film::Film;
 use crate::render::gpu::UploadedScene;
+use crate::render::light_groups::LightGroup;
 use crate::render::sun_placement::SunPlacement;
 use crate::render::{Driver, Figures, Session, View, cut_off_notice};
 use crate::scene::Camera;
@@ -37,6 +39,7 @@ pub(super) use arguments::RenderArguments;
 use beside::Beside;
 use frames::{Frames, Reel};
 use render_job::RenderJob;
+use traced::{Sums, Traced};
 
 /// Bytes of a pixel in the film, those by which noise is told among them, and in what is made of it to be written.
 const BYTES_OF_PIXEL: [u64; 2] = [56, 40];
@@ -161,38 +164,50 @@ impl Job<'_> {
         let spare: Vec<u8> =
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
-        let mut assignment = RenderJob::open(arguments, (world, environment), &view)?;
-        assignment.say(&mut notices);
-        let film_bytes = needed_bytes(arguments)[0];
-        let mut beside = Beside::new(arguments, (world, environment), &view, film_bytes);
-        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
-        let start = |on| Session::on((world, environment), view.clone(), Some(on));
-        let on_gpu = cpu.renders_instead(self.uploaded.as_ref().map(start).transpose())?;
-        let session = on_gpu.unwrap_or_else(|| Session::new(world, environment, view));
-        let mut driver = assignment.driver(session);
-        let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
-        let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), &notices);
-        assignment.set_metadata(record.metadata());
-        let mut cpu = TakeOver { choice: arguments.device, notices: &mut notices };
-        let counted = known.as_ref().and_then(|known| known.counted.as_ref());
-        let begun = counted.map_or(Ok(()), |counted| {
-            let taken_up = driver.session.continue_learning(counted);
-            cpu.goes_on(&mut driver.session, taken_up).map(|_| ())
-        });
-        let outcome = begun.and_then(|()| {
-            let pictures = (&mut driver, &mut beside);
-            work(pictures, &mut assignment, &self.interrupt, progress, &mut cpu)
-        });
-        progress.finish();
-        if !driver.has_samples() {
-            return outcome.map(|()| Vec::new());
+        let groups = match arguments.light_groups {
+            true => LightGroup::all_of((world, environment), &view)?,
+            false => Vec::new(),
+        };
+        let mut each = vec![((world, environment), view.clone())];
+        if !groups.is_empty() {
+            let of_group =
+                |(number, group): (usize, &'_ LightGroup)| group.view(&view, number == 0);
+            let views = groups.iter().enumerate().map(of_group);
+            let lit = groups.iter().map(|group| (world, &group.environment));
+            each = lit.zip(views).collect();
         }
+        let count = each.len();
+        let seconds = arguments.seconds.map(|seconds| seconds / count as f64);
+        let of_each = RenderArguments { seconds, ..arguments.clone() };
+        let counted = known.as_ref().and_then(|known| known.counted.as_ref());
+        let (mut assignments, mut pictures, mut outcome) = (Vec::new(), Vec::new(), Ok(()));
+        for (lit, view) in each {
+            // After a person's wish to end, each of the others gets a sample.
+            if !pictures.is_empty() && !self.interrupt.was_signalled() {
+                self.interrupt.go_on();
+            }
+            let (assignment, picture, ended) =
+                self.trace(&of_each, lit, view, counted, (&mut notices, progress))?;
+            assignments.push(assignment);
+            pictures.push(picture);
+            outcome = ended;
+            if outcome.is_err() {
+                break;
+            }
+        }
+        progress.finish();
+        let is_whole = pictures.len() == count && pictures.iter().all(|it| it.driver.has_samples());
+        let last = (assignments.last_mut(), pictures.last());
+        let (Some(assignment), Some(Traced { driver, .. }), true) = (last.0, last.1, is_whole)
+        else {
+            return outcome.map(|()| Vec::new());
+        };
         drop(spare);
-        let film = driver.film();
-        let cached = beside.film(&film);
-        let mut remarks = output::remarks(&film, environment);
+        let sums = Sums::of(&pictures, &groups);
+        let (film, cached) = (&*sums.film, sums.cached());
+        let mut remarks = output::remarks(film, environment);
         remarks.extend(cached.map(|(cached, _)| {
-            let [exact, cached] = [&*film, cached].map(Film::min_samples);
+            let [exact, cached] = [film, cached].map(Film::min_samples);
             format!(
                 "denoised from {} samples a pixel: {exact} exact, {cached} of cached light (--gi exact: none)",
                 exact + cached
@@ -203,15 +218,15 @@ impl Job<'_> {
         let (asked, mut arguments) = (arguments, Cow::Borrowed(arguments));
         if known.is_some() {
             // What the first frame has is what all have.
-            arguments.to_mut().picture.take_exposure(&film, &asked.pictures());
+            arguments.to_mut().picture.take_exposure(film, &asked.pictures());
         }
-        let figures = driver.session.figures();
-        let done = (&*film, &figures, beside.seconds);
+        let done = (film, &sums.figures, sums.cached_seconds);
         let record = self.record(&arguments, &driver.session, done, &notices);
-        let mut failures = outputs::write(&arguments, &assignment, &driver, &record, cached);
+        let films = Films { film, cached, denoised: None, groups: &sums.groups };
+        let mut failures = outputs::write(&arguments, assignment, driver, &record, films);
         // Another device may have taken over.
         assignment.set_metadata(record.metadata());
-        failures.extend(assignment.keep(&driver).err());
+        failures.extend(assignment.keep(driver).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
             failures.push(failure);
@@ -222,6 +237,38 @@ impl Job<'_> {
             known.counted = driver.session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
+    }
+
+    /// Renders one picture until a rule or the user says stop; how that ended.
+    fn trace<'l>(
+        &'l self,
+        arguments: &RenderArguments,
+        lit: Lit<'l>,
+        view: View,
+        counted: Option<&LearningGrid>,
+        (notices, progress): (&mut Notices, &Progress),
+    ) -> Result<(RenderJob, Traced<'l>, Result<()>)> {
+        let mut assignment = RenderJob::open(arguments, lit, &view)?;
+        assignment.say(notices);
+        let mut beside = Beside::new(arguments, lit, &view, needed_bytes(arguments)[0]);
+        let mut cpu = TakeOver { choice: arguments.device, notices };
+        let start = |on: &UploadedScene| Session::on(lit, view.clone(), Some(&on.relit(lit.1)?));
+        let on_gpu = cpu.renders_instead(self.uploaded.as_ref().map(start).transpose())?;
+        let session = on_gpu.unwrap_or_else(|| Session::new(lit.0, lit.1, view));
+        let mut driver = assignment.driver(session);
+        let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
+        let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), notices);
+        assignment.set_metadata(record.metadata());
+        let mut cpu = TakeOver { choice: arguments.device, notices };
+        let begun = counted.map_or(Ok(()), |counted| {
+            let taken_up = driver.session.continue_learning(counted);
+            cpu.goes_on(&mut driver.session, taken_up).map(|_| ())
+        });
+        let outcome = begun.and_then(|()| {
+            let pictures = (&mut driver, &mut beside);
+            work(pictures, &mut assignment, &self.interrupt, progress, &mut cpu)
+        });
+        Ok((assignment, Traced { driver, beside }, outcome))
     }
 
     /// What there is to say about a film of the session.

@@ -150,6 +150,40 @@ impl Environment {
         Ok(environment)
     }
 
+    /// The map without the light of its sun and with nothing else, as [`EnvironmentOptions::sun`] parts them.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn parted(&self) -> Result<[Self; 2]> {
+        let sky = self.with_sun(0.0)?;
+        let mut sun = self.map().clone();
+        for (pixel, sky) in sun.pixels.iter_mut().zip(&sky.map().pixels) {
+            *pixel = [0, 1, 2].map(|channel| (pixel[channel] - sky[channel]).max(0.0));
+        }
+        Ok([sky, self.with_map(sun)?])
+    }
+
+    /// The same with a factor on its sun, as [`EnvironmentOptions::sun`] is.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn with_sun(&self, factor: f32) -> Result<Self> {
+        self.with_map(sun::with_sun(self.map().clone(), factor))
+    }
+
+    fn with_map(&self, map: Image) -> Result<Self> {
+        let (tile_columns, tile_rows) = self.tile_grid();
+        let options = EnvironmentOptions {
+            table: self.table_kind,
+            tile_columns,
+            tile_rows,
+            intensity: self.intensity,
+            ..EnvironmentOptions::default()
+        };
+        let rotation_turns = self.rotation_turns;
+        Ok(Self { rotation_turns, ..Self::new(map, &options)? })
+    }
+
     /// Turns the map to this angle (finite, radians); nothing is rebuilt.
     pub fn set_rotation(&mut self, rotation_radians: f32) {
         let turns = (f64::from(rotation_radians) / TAU).rem_euclid(1.0) as f32;

@@ -14,6 +14,7 @@ use crate::image::{
     ExrPicture, Image, Layer, extension, write_exr, write_png, write_png_with_alpha,
 };
 use crate::render::film::{Film, Pixel};
+pub use crate::render::light_groups::GroupImage;
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
 /// A layer that can be asked for.
@@ -76,11 +77,13 @@ pub struct Films<'a> {
     pub cached: Option<(&'a Film, f32)>,
     /// The picture without noise, where that was made for several files.
     pub denoised: Option<&'a Image>,
+    /// What each group of light makes of it, if it was rendered so; they add up to the film.
+    pub groups: &'a [GroupImage],
 }
 
 impl<'a> From<&'a Film> for Films<'a> {
     fn from(film: &'a Film) -> Self {
-        Self { film, cached: None, denoised: None }
+        Self { film, cached: None, denoised: None, groups: &[] }
     }
 }
 
@@ -166,6 +169,10 @@ pub fn write_picture(
     if holds_layers(path) {
         let whole = film.without_gaps();
         let (mut image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
+        layers.extend(films.groups.iter().map(|GroupImage { name, factor, image }| {
+            let pixels: Vec<_> = image.pixels.iter().map(|rgb| rgb.map(|x| x * factor)).collect();
+            Layer { name: format!("light.{name}"), channels: split(&pixels, ["R", "G", "B"]) }
+        }));
         let is_rgb = options.rgb == LinearRgb::Denoised;
         if (is_rgb || options.layers.contains(&LayerName::Denoised)) && options.denoiser.is_some() {
             metadata.extend(filter_metadata(options, films));

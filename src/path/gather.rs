@@ -38,7 +38,7 @@ impl Path<'_> {
             }
             self.sampler.skip(1);
         }
-        if !self.tracer.world.lights.is_empty() {
+        if !self.tracer.lights.is_empty() {
             chosen.of_lamps = Some(self.sampler.next_pair_bits());
         }
         chosen
@@ -93,7 +93,7 @@ impl Path<'_> {
         let world = self.tracer.world;
         let point_at = |hit: &Hit, direction| world.point(hit, direction);
         let receiver = vertex.receiver();
-        let sample = world.lights.sample(&world.scene, &receiver, bits, point_at)?;
+        let sample = self.tracer.lights.sample(&world.scene, &receiver, bits, point_at)?;
         let (f, own_pdf) = vertex.scatterer.scattered(sample.direction)?;
         let is_punctual = sample.pdf_solid_angle.is_infinite();
         let light = match self.sight(vertex, sample.direction, sample.distance) {

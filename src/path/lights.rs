@@ -1,6 +1,8 @@
 //! Light sources inside the scene: emissive triangles and punctual lights.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
@@ -36,13 +38,46 @@ pub struct LightSample {
 pub struct LocalLights {
     /// Emissive triangles, ascending: the first lights. Punctual ones follow in the scene's order.
     pub(crate) triangles: Vec<u32>,
+    /// Point, spot and directional lights as they count.
+    pub(crate) punctual: Vec<PunctualLight>,
     /// How lights are chosen.
     pub(crate) tree: LightTree,
 }
 
+/// Which lights inside a scene count, and how much.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum LightChoice {
+    /// All as they are.
+    #[default]
+    All,
+    /// Some.
+    Some {
+        /// Whether what surfaces emit counts.
+        surfaces: bool,
+        /// Factors on point, spot and directional lights by their names; others do not count.
+        lamps: Arc<BTreeMap<String, f32>>,
+    },
+}
+
+impl LightChoice {
+    /// Whether what surfaces emit counts.
+    pub(crate) fn has_surfaces(&self) -> bool {
+        matches!(self, Self::All | Self::Some { surfaces: true, .. })
+    }
+
+    /// A light as it counts.
+    fn applied(&self, light: &PunctualLight) -> PunctualLight {
+        let factor = match self {
+            Self::All => 1.0,
+            Self::Some { lamps, .. } => lamps.get(&light.name).copied().unwrap_or(0.0),
+        };
+        PunctualLight { intensity: light.intensity * factor, ..light.clone() }
+    }
+}
+
 impl LocalLights {
-    /// Collects the lights of a scene with bounds `(min, max)`.
-    pub fn new(scene: &Scene, bounds: (Vec3, Vec3)) -> Self {
+    /// Collects the chosen lights of a scene with bounds `(min, max)`.
+    pub fn new(scene: &Scene, bounds: (Vec3, Vec3), choice: &LightChoice) -> Self {
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();
         let mut triangles = Vec::new();
         let mut lights = Vec::new();
@@ -50,7 +85,8 @@ impl LocalLights {
         let mut total = 0.0;
         // Instances share no lamps: the tree of lights holds places in the world.
         for triangle in scene.own_triangles() {
-            if emits[scene.triangle_materials[triangle as usize] as usize]
+            if choice.has_surfaces()
+                && emits[scene.triangle_materials[triangle as usize] as usize]
                 && let Some((moments, power)) = triangle_moments(scene, triangle)
             {
                 lights.push(Light { index: triangles.len() as u32, moments });
@@ -59,7 +95,8 @@ impl LocalLights {
             }
         }
         let radius = 0.5 * (bounds.1 - bounds.0).length();
-        for (index, light) in (triangles.len() as u32..).zip(&scene.lights) {
+        let punctual: Vec<_> = scene.lights.iter().map(|light| choice.applied(light)).collect();
+        for (index, light) in (triangles.len() as u32..).zip(&punctual) {
             let power = punctual_power(light, radius);
             if power <= 0.0 {
                 continue;
@@ -73,11 +110,11 @@ impl LocalLights {
         }
         let everything = total + distant.iter().map(|(_, power)| power).sum::<f64>();
         if !(everything > 0.0 && everything.is_finite()) {
-            return Self::default();
+            return Self { punctual, ..Self::default() };
         }
         relate(&mut lights);
         let tree = LightTree::new(lights, total, &distant, triangles.len());
-        Self { triangles, tree }
+        Self { triangles, punctual, tree }
     }
 
     /// Whether there is nothing to sample.
@@ -102,7 +139,7 @@ impl LocalLights {
         let choice = self.tree.sample(receiver, bits[0]);
         let probability = choice.probability;
         let Some(&triangle) = self.triangles.get(choice.light as usize) else {
-            let light = &scene.lights[choice.light as usize - self.triangles.len()];
+            let light = &self.punctual[choice.light as usize - self.triangles.len()];
             return sample_punctual(light, receiver.position, probability);
         };
         let corners = scene.corners(triangle);

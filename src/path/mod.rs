@@ -34,7 +34,7 @@ mod world_builder;
 pub use background::Background;
 pub(crate) use learn::MAX_COUNTED;
 pub use light_tree::Receiver;
-pub use lights::{LightSample, LocalLights};
+pub use lights::{LightChoice, LightSample, LocalLights};
 pub use limits::PathLimits;
 pub use looks::FirstHit;
 pub use tracer::{PathResult, PathTracer};

@@ -140,12 +140,12 @@ impl GlassWalk {
             }
             let Some(hit) = hit else { return walk };
             let point = world.point(&hit, ray.direction);
-            if interfaces > 0 && world.needs.has(SceneFeatures::EMITTERS) {
+            if interfaces > 0 && tracer.has_emission && world.needs.has(SceneFeatures::EMITTERS) {
                 let emitted = lights::emitted(&world.scene, &point, -ray.direction);
                 walk.emitted += walk.transmittance * emitted;
                 if let Some(receiver) = receiver.filter(|_| emitted.max_element() > 0.0) {
                     let distance = receiver.position.distance(point.position);
-                    walk.lamp_pdf += world.lights.sample_pdf_solid_angle(
+                    walk.lamp_pdf += tracer.lights.sample_pdf_solid_angle(
                         &world.scene,
                         hit.triangle,
                         receiver,

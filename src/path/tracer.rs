@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use super::background::Background;
 use super::body::Body;
 use super::light_tree::Receiver;
-use super::lights;
+use super::lights::{self, LocalLights};
 use super::limits::{self, CutOff, MAX_INTERFACES, PathLimits};
 use super::looks::{FirstHit, Looks};
 use super::splitting::{MIN_NARROW, MIN_SHARED_NARROW, UseOfVertices};
@@ -28,10 +28,14 @@ use crate::scene::surface::{Sides, SurfacePoint};
 /// All that a path reads.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a> {
-    /// Scene, BVH and local lights.
+    /// Scene and BVH.
     pub world: &'a World,
     /// The map.
     pub environment: &'a Environment,
+    /// The lights inside the scene that count.
+    pub lights: &'a LocalLights,
+    /// Whether what surfaces emit counts.
+    pub has_emission: bool,
     /// How NEE chooses tiles; `None` samples the map by the BSDF alone.
     pub grid: Option<&'a LightGrid>,
     /// Where it is counted what samples of the map see.
@@ -424,7 +428,9 @@ impl<'a> Path<'a> {
             self.looks.look_at(point, &bsdf, self.travelled);
         }
         if parameters.unlit {
-            self.radiance += self.throughput * parameters.emissive;
+            if self.tracer.has_emission {
+                self.radiance += self.throughput * parameters.emissive;
+            }
             return None;
         }
         Some(bsdf)
@@ -458,7 +464,7 @@ impl<'a> Path<'a> {
     fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint<'_>) {
         let world = self.tracer.world;
         let emitted = lights::emitted(&world.scene, point, -self.ray.direction);
-        if emitted.max_element() <= 0.0 {
+        if emitted.max_element() <= 0.0 || !self.tracer.has_emission {
             return;
         }
         let from = self.departure;
@@ -470,7 +476,7 @@ impl<'a> Path<'a> {
             balance_heuristic(from.pdf_solid_angle, walk.lamp_pdf)
         } else {
             let distance = from.receiver.position.distance(point.position);
-            let nee = world.lights.sample_pdf_solid_angle(
+            let nee = self.tracer.lights.sample_pdf_solid_angle(
                 &world.scene,
                 hit.triangle,
                 &from.receiver,

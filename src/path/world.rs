@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use std::sync::Arc;
 
-use super::lights::LocalLights;
+use super::lights::{LightChoice, LocalLights};
 use super::materials::{Passing, ReadyMaterial};
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray, Shared};
@@ -47,7 +47,7 @@ impl World {
 
     fn of_geometry(scene: Scene, bvh: Bvh, geometry: Arc<()>) -> Self {
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
-        let lights = LocalLights::new(&scene, bvh.bounds());
+        let lights = LocalLights::new(&scene, bvh.bounds(), &LightChoice::All);
         Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, geometry, clock: None }
     }
 

@@ -59,12 +59,6 @@ impl<'s> CachedPicture<Session<'s>> {
         Ok(Self::new(session))
     }
 
-    /// Its film, once all of its pixels have a sample, and what one of its samples counts beside one of the `exact` film.
-    pub(crate) fn film_beside(&self, exact: &Film) -> Option<(&Film, f32)> {
-        let film = (self.session.samples() > 0).then(|| self.session.film())?;
-        Some((film, worth(exact, film, block_errors(exact, Some(film)).as_ref())))
-    }
-
     /// What renders it, if it gets its next sample before the exact picture: a few of them for each, fewer where exact
     /// samples `are_wanted` for themselves. Until it has one the exact one has every third turn, for what is shown must not
     /// stand still while the cache is trained.

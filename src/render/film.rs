@@ -75,6 +75,16 @@ impl Pixel {
         Self { sums, samples, invalid }
     }
 
+    /// Of a mean over `samples` samples and its variance, which is that of its luminance.
+    pub(super) fn of_mean(mean: DVec3, variance: f64, samples: u32, invalid: u32) -> Self {
+        let count = f64::from(samples);
+        let [red, green, blue] = (mean * count).to_array();
+        let pixel = Self::of_sums([red, green, blue, 0.0], samples, invalid);
+        let spread = if samples > 1 { variance * (count - 1.0) } else { 0.0 };
+        let squares = count * (pixel.mean_luminance().powi(2) + spread);
+        Self::of_sums([red, green, blue, squares], samples, invalid)
+    }
+
     /// What [`Self::of_sums`] takes.
     pub(crate) fn sums(&self) -> [f64; 4] {
         self.sums

@@ -14,6 +14,7 @@ pub mod gpu;
 mod gpu_facts;
 #[cfg(feature = "window")]
 pub(crate) mod keyframe;
+pub(crate) mod light_groups;
 #[cfg(feature = "window")]
 pub(crate) mod light_parts;
 mod pass;

@@ -67,8 +67,8 @@ impl Figures {
         self.learning_seconds + self.render_seconds
     }
 
-    /// Counts what an earlier process did for a film that is gone on from.
-    pub(super) fn add(&mut self, before: &Self) {
+    /// Counts what was done for a film that is gone on from, or shown together with this one.
+    pub(crate) fn add(&mut self, before: &Self) {
         self.samples += before.samples;
         // Paths that taught what it was made with, though nothing may have been learned again.
         self.learning_paths = self.learning_paths.max(before.learning_paths);

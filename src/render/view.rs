@@ -8,7 +8,7 @@ use super::filter::PixelFilter;
 use crate::light_grid::{DistributionOptions, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::{Background, Lit, PathLimits, PathTracer, World};
+use crate::path::{Background, LightChoice, Lit, LocalLights, PathLimits, PathTracer, World};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium};
 
@@ -98,6 +98,8 @@ pub struct View {
     /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
     /// and a medium that is all zero is clear air.
     pub medium: Option<Medium>,
+    /// Which lights inside the scene count.
+    pub local_lights: LightChoice,
     /// What the camera sees where it sees no surface.
     pub background: Background,
     /// The part of a larger picture that this one is; `None` is the whole.
@@ -160,6 +162,7 @@ impl View {
             learning_paths: Self::suitable_learning_paths(sampling, [width, height], None),
             distributions: DistributionOptions::ADAPTIVE,
             medium: None,
+            local_lights: LightChoice::All,
             background: Background::default(),
             crop: None,
             layers: false,
@@ -214,6 +217,8 @@ impl View {
         PathTracer {
             world,
             environment,
+            lights: &world.lights,
+            has_emission: self.local_lights.has_surfaces(),
             grid,
             counts: None,
             cache: None,
@@ -222,6 +227,12 @@ impl View {
             limits: self.limits,
             layers: self.layers,
         }
+    }
+
+    /// The lights inside the scene that count; `None` are all.
+    pub(crate) fn chosen_lights(&self, world: &World) -> Option<LocalLights> {
+        let some = self.local_lights != LightChoice::All;
+        some.then(|| LocalLights::new(&world.scene, world.bvh.bounds(), &self.local_lights))
     }
 
     /// The medium that is rendered, in its box; `None` in clear air.

@@ -74,7 +74,7 @@ pub(in crate::app) fn show(
             cell(ui, interface, inspector, inspected, map);
         }
         None if interface.pinned.is_some() => {
-            theme::note(ui, "There is no surface here, only the map; click elsewhere.")
+            theme::note(ui, "There is no surface here, only the map; click elsewhere.");
         }
         None => theme::note(ui, "Point at a surface; click to pin it."),
     }

@@ -18,13 +18,14 @@ const NAME_WIDTH: f32 = 102.0;
 /// Draws the section.
 pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
     let Controls { document, interface, .. } = controls;
-    late_factor(ui, "All", "Brightness of all lamps", &mut document.lamps);
+    let is_late = !document.light_mix;
+    late_factor(ui, "All", "Brightness of all lamps", (&mut document.lamps, is_late));
     let mut has_changed = false;
     let mut rows = |ui: &mut Ui, rows: Range<usize>| {
         for lamp in &scene.named_lamps[rows] {
             let before = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
             let mut edit = before;
-            ui.push_id(&lamp.name, |ui| row(ui, lamp, &mut edit));
+            ui.push_id(&lamp.name, |ui| row(ui, lamp, (&mut edit, is_late)));
             if edit == before {
                 continue;
             }
@@ -50,12 +51,12 @@ pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene
         document.lamp_edits.clear();
         has_changed = true;
     }
-    if has_changed {
+    if has_changed && is_late {
         interface.keep_moving(ui.ctx());
     }
 }
 
-fn row(ui: &mut Ui, lamp: &PunctualLight, edit: &mut LampEdit) {
+fn row(ui: &mut Ui, lamp: &PunctualLight, (edit, is_late): (&mut LampEdit, bool)) {
     ui.horizontal(|ui| {
         let mut is_on = !edit.off;
         ui.checkbox(&mut is_on, "").on_hover_text("On or off");
@@ -73,7 +74,7 @@ fn row(ui: &mut Ui, lamp: &PunctualLight, edit: &mut LampEdit) {
         if patch.changed() && rgb != Vec3::ZERO {
             edit.color = Some(rgb);
         }
-        late(ui, "factor", &mut edit.factor, |ui, value| {
+        late(ui, "factor", (&mut edit.factor, is_late), |ui, value| {
             let range = 0.0..=LampEdit::MAX_FACTOR;
             let number = DragValue::new(value).range(range).speed(0.02).max_decimals(6);
             ui.add(number.prefix("× ")).on_hover_text("Brightness: drag, or click and type")

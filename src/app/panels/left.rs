@@ -2,7 +2,8 @@
 //! shows the same.
 
 use egui::{
-    Button, Margin, Panel, Response, RichText, ScrollArea, SliderClamping, TextureHandle, Ui,
+    Button, Checkbox, Margin, Panel, Response, RichText, ScrollArea, SliderClamping, TextureHandle,
+    Ui,
 };
 
 use glam::Vec3;
@@ -20,6 +21,7 @@ use crate::app::small_maps::SmallMaps;
 use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
+use crate::render::light_groups::MAX_LAMPS;
 use crate::scene::{Frame, Medium, Scene, builtin};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 
@@ -248,12 +250,19 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     let words = ("Put the sun…", "Then click or drag in the picture where it is to shine (L)");
     button(ui, words, commands, Command::ToggleSun);
     let slider = factor(&mut document.intensity);
-    if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() {
+    let is_dragged = theme::set(ui, "Intensity", "Brightness of the map", slider).dragged();
+    if is_dragged && !document.light_mix {
         interface.keep_moving(ui.ctx());
     }
-    let hint =
-        "Brightness of the map's sun alone; its sky stays as it is. The picture starts again";
-    late_factor(ui, "Sun", hint, &mut document.sun);
+    let hint = "Brightness of the map's sun alone; its sky stays as it is";
+    late_factor(ui, "Sun", hint, (&mut document.sun, !document.light_mix));
+    let lamps = sources.scene.map_or(0, |scene| scene.named_lamps.len());
+    let may_mix = !document.light.split && lamps <= MAX_LAMPS;
+    let mix = Checkbox::new(&mut document.light_mix, "Light mix");
+    ui.add_enabled(may_mix, mix).on_hover_text(
+        "Sky, sun and each lamp get a picture of their own, so that changes to intensity, sun and lamps are seen at \
+         once, in the finished picture, too. It takes longer to become clean, and as many times the memory",
+    );
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
         let text = RichText::new("Reset rotation, intensity and sun").size(12.0);

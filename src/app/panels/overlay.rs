@@ -33,10 +33,10 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
         Some(shown) => legend(ui, shown),
         None if let Some(Err(missing)) = cache => theme::note(ui, no_cache(*missing)),
         None if overlay == Overlay::Tile && interface.tile.is_none() => {
-            theme::note(ui, "Choose a tile on the map below.")
+            theme::note(ui, "Choose a tile on the map below.");
         }
         None if shown.is_some_and(|shown| shown.order.covers_now()) => {
-            theme::note(ui, "Kept pictures have no overlays.")
+            theme::note(ui, "Kept pictures have no overlays.");
         }
         None => theme::note(ui, "The Light Grid has no cells yet."),
     }
@@ -51,6 +51,7 @@ pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
         NoCache::NotDenoised => "No radiance cache: it is trained only while Denoise is on.",
         NoCache::Split => "No radiance cache: the split view does not use it.",
         NoCache::QuickDevice => "No radiance cache: this GPU is fast enough without it.",
+        NoCache::Mixed => "No radiance cache: each group of a light mix has its own.",
         NoCache::OneBounce => "No radiance cache: direct light does not use it.",
         NoCache::Unasked | NoCache::Untrained => "The radiance cache is not trained yet.",
     }

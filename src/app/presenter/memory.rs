@@ -16,8 +16,12 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
 use crate::light_grid::LightGrid;
+use crate::render::light_groups::LightFactors;
 use crate::render::surface_map::SurfaceMap;
 use crate::tone::WhiteBalance;
+
+/// How many pixels are as wide as one of the picture that is shown at once where factors on light change.
+const REMIXED_COARSENESS: u32 = 3;
 
 /// The last result and what it was made for.
 struct Last<K, V>(Option<(K, V)>);
@@ -68,6 +72,8 @@ pub(super) struct Memory {
     recent: Recent,
     /// Automatic stops of the picture that was shown last.
     automatic_ev: f32,
+    /// The factors of its light mix.
+    mix: Option<LightFactors>,
     uploads: Uploads,
 }
 
@@ -96,6 +102,7 @@ fn shown(order: &Order, prepared: Prepared, automatic_ev: f32) -> Shown {
         picture,
         image,
         is_carried,
+        is_coarse: false,
         other: None,
         automatic_ev,
         painted: None,
@@ -120,7 +127,14 @@ impl Memory {
         } else if order.ahead.is_none() && self.is_coarse(&order.snapshot) {
             return Ok(None);
         }
-        let source = Source::main(order);
+        let mut source = Source::main(order);
+        let mix = &order.snapshot.request.mix;
+        // Other factors are to be seen at once.
+        let is_remixed = mix.is_some() && self.mix.is_some() && *mix != self.mix;
+        let is_coarse = is_remixed && order.denoiser.is_some();
+        if is_coarse {
+            source.coarseness = REMIXED_COARSENESS;
+        }
         if let Some((image, automatic_ev)) = self.ahead(order, &source) {
             // It has no samples of the request's own.
             let prepared = Prepared { is_carried: true, ..Prepared::of(&developer, image) };
@@ -155,7 +169,7 @@ impl Memory {
             self.uploads.metered.or_make((source.key(), white_balance), meter)
         })?;
         self.automatic_ev = automatic_ev;
-        let is_own = order.ahead.is_none() && order.snapshot.is_lasting();
+        let is_own = order.ahead.is_none() && order.snapshot.is_lasting() && !is_coarse;
         if let Some(image) = image.as_ref().filter(|_| is_own) {
             self.recent.keep(order, image, (is_carried, automatic_ev));
         }
@@ -203,7 +217,8 @@ impl Memory {
         developer.gpu.check()?;
         let prepared = Prepared { picture, image, is_carried, failure };
         let shown = shown(order, prepared, automatic_ev);
-        Ok(Some(Shown { other, difference, uncompared, painted, ..shown }))
+        self.mix.clone_from(mix);
+        Ok(Some(Shown { is_coarse, other, difference, uncompared, painted, ..shown }))
     }
 
     /// The request ahead as it was left, else what the last picture shows of its view; and the automatic stops of that

@@ -77,7 +77,8 @@ impl Presenter {
 
     /// Whether this is what was ordered last.
     pub(crate) fn has_made(&self, shown: Option<&Shown>) -> bool {
-        shown.map(|shown| &shown.order) == self.ordered.as_ref()
+        shown.is_none_or(|shown| !shown.is_coarse)
+            && shown.map(|shown| &shown.order) == self.ordered.as_ref()
     }
 }
 
@@ -115,7 +116,12 @@ fn run(
         let work = Work::start();
         order.snapshot.rest.set_end(start + MAX_WAIT);
         match catch_unwind(AssertUnwindSafe(|| memory.present(&order, cancel))) {
-            Ok(Ok(Some(done))) => *lock(shown) = Some(Arc::new(done)),
+            Ok(Ok(Some(done))) => {
+                if done.is_coarse {
+                    orders.change(|slot| _ = slot.value.get_or_insert_with(|| order.clone()));
+                }
+                *lock(shown) = Some(Arc::new(done));
+            }
             // It was cancelled; or the device is lost, and the window orders again on another.
             Ok(Ok(None) | Err(_)) => {}
             // The panic is on the terminal; the next picture is another try.

@@ -143,6 +143,8 @@ pub(crate) struct Shown {
     pub(in crate::app) image: Option<Arc<Image>>,
     /// Whether light that was seen from elsewhere, or in another size, is in it.
     pub(in crate::app) is_carried: bool,
+    /// Whether a finer one follows.
+    pub(in crate::app) is_coarse: bool,
     /// What the wipe uncovers: the plain picture or one of the history.
     pub(in crate::app) other: Option<LinearPicture>,
     /// Stops that bring the picture to middle grey; 0 unless measured.

@@ -45,6 +45,8 @@ pub(super) struct Source {
     denoiser: Option<Denoiser>,
     /// Whether every pixel has a sample and the picture its full size.
     is_whole: bool,
+    /// How many of its pixels are as wide as one that is made ready.
+    pub(super) coarseness: u32,
 }
 
 /// Tells sources apart: equal ones give the same picture. It keeps no film in memory.
@@ -54,6 +56,7 @@ pub(super) struct SourceKey {
     backdrop: Option<(Weak<Film>, f32)>,
     denoiser: Option<Denoiser>,
     is_whole: bool,
+    coarseness: u32,
 }
 
 impl PartialEq for SourceKey {
@@ -65,6 +68,7 @@ impl PartialEq for SourceKey {
         is_alike
             && self.film.ptr_eq(&other.film)
             && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
+            && self.coarseness == other.coarseness
     }
 }
 
@@ -76,13 +80,14 @@ impl Source {
         let is_on_device =
             snapshot.seconds() < YOUNG_SECONDS && order.developer.can_denoise(width, height);
         let denoiser = order.denoiser.map(|it| if is_on_device { Denoiser::ATrous } else { it });
-        Self { session, backdrop, denoiser, is_whole: snapshot.is_whole() }
+        Self { session, backdrop, denoiser, is_whole: snapshot.is_whole(), coarseness: 1 }
     }
 
     pub(super) fn plain(order: &Order) -> Option<Self> {
         let session = order.snapshot.plain.clone().filter(SessionSnapshot::is_begun)?;
         let is_whole = session.samples > 0;
-        Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
+        let (backdrop, denoiser) = (None, order.denoiser);
+        Some(Self { session, backdrop, denoiser, is_whole, coarseness: 1 })
     }
 
     pub(super) fn key(&self) -> SourceKey {
@@ -92,6 +97,7 @@ impl Source {
             backdrop: self.backdrop.as_ref().map(of_backdrop),
             denoiser: self.denoiser,
             is_whole: self.is_whole,
+            coarseness: self.coarseness,
         }
     }
 
@@ -107,6 +113,16 @@ impl Source {
     /// The picture on the device, without noise if that is asked for; `None` if that was cancelled.
     pub(super) fn prepare(&self, developer: &Developer, cancel: &AtomicBool) -> Option<Prepared> {
         let film = &self.session.film;
+        if self.coarseness > 1 {
+            let (every, size) = (self.coarseness, [film.width, film.height]);
+            let coarse = |film: &Arc<Film>| Arc::new(film.in_larger_pixels(every));
+            let session = SessionSnapshot { film: coarse(film), ..self.session.clone() };
+            let with_film = |of: &Backdrop| Backdrop { film: coarse(&of.film), ..*of };
+            let backdrop = self.backdrop.as_ref().map(with_film);
+            let small = Self { session, backdrop, is_whole: false, coarseness: 1, ..*self };
+            let image = small.prepare(developer, cancel)?.image?;
+            return Some(Prepared::of(developer, image.enlarged(every, size)));
+        }
         let gpu = &developer.gpu;
         let is_here = |(its, _): &&(Gpu, DeviceFilm)| {
             its.is_same(gpu) && LinearPicture::fits(gpu, film.width, film.height)
@@ -188,8 +204,8 @@ pub(super) mod tests {
             let (samples, film) = (other.total_samples(), Arc::new(other));
             let backdrop = Some(Backdrop { film, samples, worth: 4.0 });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
-            let prepared =
-                Source { session, backdrop, denoiser, is_whole }.prepare(&developer, &never);
+            let prepared = Source { session, backdrop, denoiser, is_whole, coarseness: 1 }
+                .prepare(&developer, &never);
             let prepared = prepared.expect("not cancelled");
             prepared.image.expect("made on the host").pixels.clone()
         };
@@ -209,7 +225,8 @@ pub(super) mod tests {
         let mut session = session(Film::new(6, 4, true));
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();
-            let source = Source { session, backdrop: None, denoiser, is_whole: true };
+            let (backdrop, coarseness) = (None, 1);
+            let source = Source { session, backdrop, denoiser, is_whole: true, coarseness };
             let prepared = source.prepare(developer, &AtomicBool::new(false));
             prepared.expect("not cancelled").picture.is_live
         };

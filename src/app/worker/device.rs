@@ -30,7 +30,8 @@ pub(super) struct Device {
 /// Kernels that are being compiled, and what for.
 struct Awaited {
     world: Weak<World>,
-    environment: Weak<Environment>,
+    /// Where the map lies.
+    environment: usize,
     view: View,
     /// What is held until then.
     held: Weak<CompileGuard>,
@@ -39,7 +40,6 @@ struct Awaited {
 /// What is on the GPU.
 struct Uploaded {
     world: Arc<World>,
-    environment: Arc<Environment>,
     scene: UploadedScene,
 }
 
@@ -114,24 +114,24 @@ impl Device {
     pub(super) fn place(
         &mut self,
         session: &mut Session<'_>,
-        request: &Request,
+        (request, environment): (&Request, &Environment),
         preparation: impl FnOnce() -> Arc<CompileGuard>,
     ) {
         let Some(gpu) = self.gpu.clone() else {
             session.continue_on_cpu();
             return;
         };
-        if session.is_on_gpu() || self.awaits(session, request) {
+        if session.is_on_gpu() || self.awaits(session, request, environment) {
             return;
         }
         let placed = self
-            .upload(&gpu, request)
+            .upload(&gpu, request, environment)
             .and_then(|uploaded| session.continue_on_gpu_if_compiled(uploaded, preparation));
         match placed {
             Ok(held) => {
                 self.awaited = held.map(|held| Awaited {
                     world: Arc::downgrade(&request.world),
-                    environment: Arc::downgrade(&request.environment),
+                    environment: std::ptr::from_ref(environment).addr(),
                     view: session.view().clone(),
                     held,
                 });
@@ -141,10 +141,10 @@ impl Device {
     }
 
     /// Whether the kernels of this very session are being compiled.
-    fn awaits(&self, session: &Session<'_>, request: &Request) -> bool {
+    fn awaits(&self, session: &Session<'_>, request: &Request, environment: &Environment) -> bool {
         let is_of_session = |awaited: &Awaited| {
             awaited.world.as_ptr() == Arc::as_ptr(&request.world)
-                && awaited.environment.as_ptr() == Arc::as_ptr(&request.environment)
+                && awaited.environment == std::ptr::from_ref(environment).addr()
                 && awaited.view == *session.view()
         };
         self.is_compiling() && self.awaited.as_ref().is_some_and(is_of_session)
@@ -179,17 +179,20 @@ impl Device {
         }
     }
 
-    /// The request's scene and map on the GPU; what is there already is not uploaded again.
-    fn upload(&mut self, gpu: &Gpu, request: &Request) -> Result<&UploadedScene> {
-        let (world, environment) = (&request.world, &request.environment);
-        let before = self.uploaded.take().filter(|on| Arc::ptr_eq(&on.world, world));
+    /// The request's scene and a map on the GPU; what is there already is not uploaded again.
+    fn upload(
+        &mut self,
+        gpu: &Gpu,
+        request: &Request,
+        environment: &Environment,
+    ) -> Result<&UploadedScene> {
+        let world = Arc::clone(&request.world);
+        let before = self.uploaded.take().filter(|on| Arc::ptr_eq(&on.world, &world));
         let scene = match before {
-            Some(on) if Arc::ptr_eq(&on.environment, environment) => on.scene,
             Some(on) => on.scene.relit(environment)?,
-            None => UploadedScene::new(gpu, world, environment)?,
+            None => UploadedScene::new(gpu, &world, environment)?,
         };
-        let (world, environment) = (Arc::clone(world), Arc::clone(environment));
-        Ok(&self.uploaded.insert(Uploaded { world, environment, scene }).scene)
+        Ok(&self.uploaded.insert(Uploaded { world, scene }).scene)
     }
 }
 

@@ -12,6 +12,7 @@ use std::sync::atomic::Ordering;
 
 mod device;
 mod inspection;
+mod mix_task;
 mod preparation;
 mod preview;
 mod request;
@@ -25,6 +26,7 @@ pub(super) mod tests;
 mod watch;
 
 use device::Device;
+use mix_task::MixTask;
 pub(crate) use request::{Reference, Request};
 use session_cache::SessionCache;
 use sessions::Sessions;
@@ -37,6 +39,7 @@ use super::threads::{LatestThread, Wake, lock};
 use crate::alarm::Alarm;
 use crate::error::{Error, Result};
 use crate::render::gpu::{Gpu, RayChoice};
+use crate::render::light_groups::LightGroup;
 use crate::system::lower_thread_priority;
 
 /// The handle of the render thread; it ends when dropped.
@@ -78,7 +81,8 @@ impl Worker {
             if slot.value.as_ref().is_some_and(|old| old.is_same(&request)) {
                 return;
             }
-            if slot.value.as_ref().is_some_and(|old| old.is_ended_by(&request)) {
+            let is_cut = |old: &Arc<Request>| old.is_ended_by(&request) || old.mix != request.mix;
+            if slot.value.as_ref().is_some_and(is_cut) {
                 self.shared.cancel.store(true, Ordering::Relaxed);
             }
             slot.value = Some(Arc::new(request));
@@ -102,7 +106,10 @@ impl Worker {
 
     /// Whether a picture is of what was asked for last, whatever else is wanted with it.
     pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
-        self.latest().is_some_and(|latest| !snapshot.request.restarts(&latest))
+        let is_of = |latest: &Request| {
+            !snapshot.request.restarts(latest) && snapshot.request.mix == latest.mix
+        };
+        self.latest().is_some_and(|latest| is_of(&latest))
     }
 
     /// Whether a GPU is being opened, filled or programmed.
@@ -162,16 +169,27 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
     while let Some(request) = next(done.as_deref()) {
         kept.leave_other_worlds(&request);
         let worked = catch_unwind(AssertUnwindSafe(|| {
+            // A moving picture is lit as the mix is.
+            let lit = request.mix.as_ref().filter(|_| request.moving);
+            let lit = lit.and_then(|factors| kept.lit_by(&request.environment, factors));
+            let environment = lit.as_ref().unwrap_or(&request.environment);
+            let is_mix = request.mix.is_some() && !request.moving;
+            let groups = is_mix
+                .then(|| LightGroup::all_of((&request.world, &request.environment), &request.view));
+            let say = |failure: &Error| shared.report_failure(failure.to_string());
+            let groups = groups.and_then(|groups| groups.inspect_err(say).ok());
             let sessions = Sessions {
                 world: &request.world,
-                environment: &request.environment,
+                environment,
                 watch: RequestWatch { shared, request: Arc::clone(&request) },
                 device: &mut device,
                 kept: &mut kept,
                 alarm: &alarm,
             };
-            let task = PictureTask::new(sessions);
-            pool.install(|| task.work())
+            pool.install(|| match &groups {
+                Some(groups) => MixTask::new(sessions).work(groups),
+                None => PictureTask::new(sessions).work(),
+            })
         }));
         done = Some(worked.unwrap_or_else(|_| {
             // The panic is on the terminal. Nothing of what it left is trusted.

@@ -6,6 +6,7 @@ use crate::environment::Environment;
 use crate::image::Image;
 use crate::path::World;
 use crate::render::gpu::DeviceChoice;
+use crate::render::light_groups::LightFactors;
 use crate::render::{StopRule, View};
 
 /// What is to be rendered.
@@ -35,6 +36,8 @@ pub(crate) struct Request {
     pub is_frozen: bool,
     /// What errors are measured against.
     pub reference: Option<Arc<Reference>>,
+    /// Render each group of light by itself, and show their sum times these factors. World and environment have none.
+    pub mix: Option<LightFactors>,
     /// Do nothing for now.
     pub paused: bool,
     /// Counts restarts asked for by hand.
@@ -48,6 +51,8 @@ impl Request {
             || !Arc::ptr_eq(&self.environment, &new.environment)
             || self.view != new.view
             || self.moving != new.moving
+            || self.mix.is_some() != new.mix.is_some()
+            || self.moving && self.mix != new.mix
             || self.run != new.run
     }
 
@@ -59,7 +64,7 @@ impl Request {
             && map.rotation_and_intensity() == other.rotation_and_intensity();
         let environment = Arc::clone(other);
         is_as_lit
-            && self.is_frozen == new.is_frozen
+            && (self.is_frozen, &self.mix) == (new.is_frozen, &new.mix)
             && !Self { environment, ..self.clone() }.restarts(new)
     }
 
@@ -91,6 +96,7 @@ impl Request {
             && Arc::ptr_eq(&self.environment, &new.environment)
             && (a.crop, b.crop) == (None, None)
             && (a.medium, a.background, a.limits) == (b.medium, b.background, b.limits)
+            && self.mix == new.mix
     }
 
     pub(super) fn is_same(&self, new: &Self) -> bool {
@@ -102,6 +108,7 @@ impl Request {
             && self.inspects_cache == new.inspects_cache
             && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
             && self.rule == new.rule
+            && self.mix == new.mix
             && self.paused == new.paused
     }
 }

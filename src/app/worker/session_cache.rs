@@ -1,5 +1,6 @@
 //! What one job leaves for the next.
 
+use std::f32::consts::TAU;
 use std::sync::Arc;
 
 use super::request::Request;
@@ -8,6 +9,7 @@ use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::cached_picture::CachedPicture;
+use crate::render::light_groups::LightFactors;
 use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.
@@ -23,6 +25,8 @@ pub(super) struct SessionCache {
     pub(super) snapshots: u64,
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
+    /// A map as it was lit by a mix last: what it was made from, and the factor on its sun.
+    lit: Option<(Arc<Environment>, f32, Environment)>,
     /// Pictures that were left for others, oldest first.
     left: Vec<SuspendedPicture>,
 }
@@ -116,6 +120,26 @@ impl SessionCache {
         if let Some(learned) = &mut self.learned {
             learned.world = Arc::clone(world);
         }
+    }
+
+    /// A map of factors 1 as these make it; `None` if that cannot be made.
+    pub(super) fn lit_by(
+        &mut self,
+        map: &Arc<Environment>,
+        factors: &LightFactors,
+    ) -> Option<Environment> {
+        let sun = factors.sun;
+        let is_it = |(of, factor, _): &(Arc<Environment>, f32, Environment)| {
+            of.shares_map_with(map) && *factor == sun
+        };
+        if !self.lit.as_ref().is_some_and(is_it) {
+            let lit = if sun == 1.0 { (**map).clone() } else { map.with_sun(sun).ok()? };
+            self.lit = Some((Arc::clone(map), sun, lit));
+        }
+        let mut lit = self.lit.as_ref()?.2.clone();
+        lit.set_intensity(factors.intensity);
+        lit.set_rotation(map.rotation_and_intensity().0 * TAU);
+        Some(lit)
     }
 
     /// Whether learning has come to its end in this scene.

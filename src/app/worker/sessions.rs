@@ -201,7 +201,8 @@ impl<'a> Sessions<'a> {
     fn place_if_compiled(&mut self, session: &mut Session<'_>) {
         let shared = self.watch.shared;
         let preparation = || Arc::new(Preparation::begin(shared)) as Arc<CompileGuard>;
-        self.device.place(session, &self.watch.request, preparation);
+        let lit = (&*self.watch.request, self.environment);
+        self.device.place(session, lit, preparation);
         self.report_failure();
     }
 

@@ -10,6 +10,7 @@ use crate::radiance_cache::CacheFacts;
 use crate::render::block_errors::BlockErrors;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu, GpuFigures};
+use crate::render::light_groups::GroupImage;
 use crate::render::{Figures, Sampling, View};
 
 /// What the worker is doing.
@@ -90,6 +91,8 @@ pub(crate) enum NoCache {
     Split,
     /// The device has many samples before a cache would be trained.
     QuickDevice,
+    /// A light mix has one for each group.
+    Mixed,
     /// Light that has met one surface needs none.
     OneBounce,
     /// It will be.
@@ -125,6 +128,8 @@ pub(crate) struct Snapshot {
     pub errors: Option<BlockErrors>,
     /// A sentence where paths end with much of their light left.
     pub cut_off: Option<Arc<str>>,
+    /// The light of each group of a light mix, without factors.
+    pub groups: Vec<GroupImage>,
     /// Whoever shows it says here when the next one will be wanted.
     pub(in crate::app) rest: Arc<PublishThrottle>,
 }

@@ -449,6 +449,7 @@ impl<'a> PictureTask<'a> {
                 is_quick,
             ),
             curves: self.inspection.curves.clone(),
+            groups: Vec::new(),
             rest: Arc::clone(&shared.throttle),
             request,
         });

@@ -26,6 +26,7 @@ pub(super) fn request(world: Arc<World>, environment: Arc<Environment>, size: [u
         rule: StopRule::default(),
         is_frozen: false,
         reference: None,
+        mix: None,
         paused: false,
         run: 0,
     }
@@ -43,6 +44,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
         counters: None,
         cache: Err(NoCache::Unasked),
         curves: [Vec::new(), Vec::new()],
+        groups: Vec::new(),
         backdrop: None,
         cut_off: None,
         cached_seconds: 0.0,

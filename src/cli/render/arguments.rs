@@ -123,6 +123,10 @@ pub(in crate::cli) struct RenderArguments {
     /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
     #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto", help_heading = "Light")]
     pub(super) sharing: Sharing,
+    /// Renders sky, sun, each lamp by its name, and what surfaces emit by themselves: the picture is their sum, and
+    /// an .exr has a layer of each (light.sky, light.sun, ...). Samples and noise are those of each of them.
+    #[arg(long, conflicts_with_all = ["part", "checkpoint", "distributions", "frames", "turntable"], help_heading = "Light")]
+    pub(super) light_groups: bool,
     /// What becomes of light that has met several surfaces. Unless it is given: exact, with up to 16 samples of
     /// cached light beside it where a picture of a room is denoised, for as long as its own are few.
     #[arg(long, value_name = "exact|cached", help_heading = "Light")]

@@ -93,8 +93,9 @@ impl<'a> Beside<'a> {
         picture.map_or(0, |picture| picture.session.samples())
     }
 
-    /// The film by cached light, and what one of its samples counts beside one of the exact `film`.
-    pub(super) fn film(&self, film: &Film) -> Option<(&Film, f32)> {
-        self.picture.as_ref()?.film_beside(film)
+    /// The film by cached light, once all of its pixels have a sample.
+    pub(super) fn film(&self) -> Option<&Film> {
+        let session = &self.picture.as_ref()?.session;
+        (session.samples() > 0).then(|| session.film())
     }
 }

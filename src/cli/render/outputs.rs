@@ -11,7 +11,6 @@ use crate::output::Films;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
-use crate::render::film::Film;
 use crate::render::{Driver, Sampling, View};
 
 /// Refuses outputs before the work rather than after it.
@@ -91,9 +90,8 @@ pub(super) fn write(
     assignment: &RenderJob,
     driver: &Driver<'_>,
     record: &Record<'_>,
-    cached: Option<(&Film, f32)>,
+    films: Films<'_>,
 ) -> Vec<Error> {
-    let films = Films { film: record.film, cached, denoised: None };
     let metadata = record.metadata();
     let of_pictures = || arguments.picture.denoised(&arguments.pictures(), films);
     let denoised = arguments.part.is_none().then(of_pictures).flatten();

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::Vec3;
+
 use super::super::View;
 use super::bound::Bound;
 use super::buffers::Buffers;
@@ -17,11 +19,11 @@ use super::layout::{self, Globals, Work};
 use super::pipeline::Programs;
 use super::progress::Tiles;
 use super::shader::{Constants, Program};
-use super::uploaded_scene::{UploadedScene, put_array};
+use super::uploaded_scene::{UploadedScene, put_array, put_lights};
 use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::Lit;
+use crate::path::{Lit, World};
 use crate::scene::needs::SceneFeatures;
 
 /// Tiles of a dispatch that keep a software device's cores busy.
@@ -76,6 +78,7 @@ impl Dispatcher {
             compile_seconds: 0.0,
         };
         dispatcher.put_tables(view, environment)?;
+        dispatcher.put_lights(view, world)?;
         let buffers = &mut dispatcher.buffers;
         if features.view.contains(ViewFeatures::COUNTING) {
             // Until there is something to count.
@@ -86,6 +89,22 @@ impl Dispatcher {
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         dispatcher.write_globals();
         Ok(dispatcher)
+    }
+
+    /// Uploads the lights inside the scene that count, unless all do: these came with the scene.
+    fn put_lights(&mut self, view: &View, world: &World) -> Result<()> {
+        let Some(lights) = view.chosen_lights(world) else { return Ok(()) };
+        let Self { buffers, globals, features, .. } = self;
+        features.view.set(ViewFeatures::LOCAL_LIGHTS, !lights.is_empty());
+        if features.scene_lights() {
+            put_lights(buffers, globals, &lights)?;
+        }
+        if !view.local_lights.has_surfaces() {
+            let (mut materials, _) = layout::materials(world);
+            materials.iter_mut().for_each(|material| material.emissive = Vec3::ZERO);
+            put_array(buffers, "materials", "the list of materials", &materials)?;
+        }
+        Ok(())
     }
 
     /// Uploads the small tables of numbers; says where each begins.

@@ -406,13 +406,13 @@ pub(super) const DIRECTIONAL_LIGHT: u32 = 2;
 pub(super) const PUNCTUAL_WORDS: usize = 16;
 
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
-pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
-    let LocalLights { triangles, tree } = &world.lights;
+pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u32> {
+    let LocalLights { triangles, punctual, tree } = lights;
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;
     let mut words = [triangles.as_slice(), &tree.leaves].concat();
     words.extend(tree.distant.iter().flat_map(|distant| [distant.share, distant.light]));
-    for light in &world.scene.lights {
+    for light in punctual {
         let (kind, cosines) = match light.kind {
             PunctualKind::Point => (0, [0.0; 2]),
             PunctualKind::Spot { inner_radians, outer_radians } => {

@@ -15,7 +15,7 @@ use crate::bvh::InstanceWords;
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::World;
+use crate::path::{LocalLights, World};
 use crate::scene::needs::SceneFeatures;
 
 /// Deepest tree a traversal's stack is made for.
@@ -107,9 +107,7 @@ impl UploadedScene {
             buffers.put_array("texels", "the set of textures", texels, parts)?;
         }
         if features.scene_lights() {
-            let lights = layout::light_words(world, globals);
-            put_array(buffers, "lights", "the list of lights", &lights)?;
-            put_array(buffers, "light_nodes", "the tree of lights", &world.lights.tree.nodes)?;
+            put_lights(buffers, globals, &world.lights)?;
         }
         self.constants = Constants {
             stack_size,
@@ -176,6 +174,17 @@ impl UploadedScene {
         let bytes = parts.into_iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
         buffers.put_array("sums", "the map's importance table", words, bytes)
     }
+}
+
+/// Uploads lights inside the scene.
+pub(super) fn put_lights(
+    buffers: &mut Buffers,
+    globals: &mut Globals,
+    lights: &LocalLights,
+) -> Result<()> {
+    let words = layout::light_words(lights, globals);
+    put_array(buffers, "lights", "the list of lights", &words)?;
+    put_array(buffers, "light_nodes", "the tree of lights", &lights.tree.nodes)
 }
 
 /// Makes an array of values that take whole texels or parts of one.

@@ -51,6 +51,7 @@ impl<'a> Session<'a> {
         let tiles = Tiles::new((world, environment), &view);
         let training = CacheTraining::new((world, environment), &view);
         let state = SessionState {
+            lights: view.chosen_lights(world),
             view,
             film: HostFilm::new(),
             samples: 0,

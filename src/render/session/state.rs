@@ -5,7 +5,7 @@ use super::host_film::HostFilm;
 use super::learning::Tiles;
 use super::noise::Noise;
 use crate::light_grid::LearningGrid;
-use crate::path::{Lit, PathTracer};
+use crate::path::{Lit, LocalLights, PathTracer};
 #[cfg(feature = "window")]
 use crate::radiance_cache::RadianceSums;
 use crate::render::film::Film;
@@ -16,6 +16,8 @@ use crate::sampler::Sequence;
 /// All that a [`Session`](super::Session) has of its own.
 pub(crate) struct SessionState {
     pub(super) view: View,
+    /// The lights of the scene that count; `None` are all.
+    pub(super) lights: Option<LocalLights>,
     pub(super) film: HostFilm,
     /// Fewest samples of any pixel.
     pub(super) samples: u32,
@@ -46,7 +48,8 @@ impl SessionState {
         counts: Option<&'b LearningGrid>,
     ) -> PathTracer<'b> {
         let cache = self.training.as_ref().and_then(CacheTraining::cache);
-        PathTracer { counts, cache, ..self.view.tracer(lit, self.tiles.grid()) }
+        let lights = self.lights.as_ref().unwrap_or(&lit.0.lights);
+        PathTracer { lights, counts, cache, ..self.view.tracer(lit, self.tiles.grid()) }
     }
 
     /// Notes seconds of rendering and the samples taken in them.
