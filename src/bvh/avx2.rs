@@ -6,8 +6,9 @@ use std::arch::x86_64::{
     _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps,
 };
 
+use super::build::Tree;
 use super::lanes::Lanes;
-use super::traverse::{self, TreeRef};
+use super::traverse;
 use super::wide::WIDTH;
 use super::{Hit, Ray};
 
@@ -82,7 +83,7 @@ impl Lanes for Avx2 {
 /// [`traverse::closest_hit`] on AVX2 lanes. Call only if [`is_available`].
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn closest_hit<const LEVELS: usize>(
-    tree: TreeRef<'_>,
+    tree: &Tree,
     ray: &Ray,
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
@@ -92,7 +93,7 @@ pub(super) fn closest_hit<const LEVELS: usize>(
 /// [`traverse::any_hit`] on AVX2 lanes. Call only if [`is_available`].
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn any_hit<const LEVELS: usize>(
-    tree: TreeRef<'_>,
+    tree: &Tree,
     ray: &Ray,
     blocks: impl FnMut(&Hit) -> bool,
 ) -> bool {

@@ -17,13 +17,17 @@ const BALANCED_FROM_DEPTH: usize = MAX_DEPTH - 12;
 /// Levels of a wide tree below which one thread writes each subtree.
 const TOP_LEVELS: usize = 4;
 
-/// The finished parts of a tree.
+/// A finished tree.
+#[derive(Debug, Clone)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
     pub(super) blocks: Vec<Block>,
+    /// Its instances.
     pub(super) placed: Vec<Placed>,
     pub(super) root: Reference,
     pub(super) bounds: (Vec3, Vec3),
+    /// Largest absolute coordinate of the scene.
+    pub(super) extent: f32,
 }
 
 /// Builds over all triangles that have an area, a tree for each mesh and one above them. There is a
@@ -41,10 +45,12 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'
     };
     let placed: Vec<Placed> = shared.instances.par_iter().map(place).collect();
     let own = shared.own(triangles.len()) as u32;
-    let root = parts.collapse(&Items::new(sources, 0..own, &placed));
+    let Root { reference: root, bounds, .. } =
+        parts.collapse(&Items::new(sources, 0..own, &placed));
+    let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
     let (nodes, blocks) =
         rayon::join(|| joined_on_huge_pages(parts.nodes), || joined_on_huge_pages(parts.blocks));
-    Tree { nodes, blocks, placed, root: root.reference, bounds: root.bounds }
+    Tree { nodes, blocks, placed, root, bounds, extent }
 }
 
 fn bounds(binary: &Bvh2, index: u32) -> (Vec3, Vec3) {

@@ -41,7 +41,7 @@ impl CompressedTree {
         let sources = Sources { positions, triangles };
         let mut tree = Self::default();
         let own = Shared { meshes, instances: &[] }.own(triangles.len()) as u32;
-        let top = tree.append(&Items::new(sources, 0..own, &bvh.placed), &tag).1;
+        let top = tree.append(&Items::new(sources, 0..own, &bvh.tree.placed), &tag).1;
         let (roots, depths): (Vec<u32>, Vec<u32>) = meshes
             .iter()
             .map(|mesh| tree.append(&Items::new(sources, mesh.clone(), &[]), &tag))

@@ -4,22 +4,12 @@ use std::mem::MaybeUninit;
 
 use glam::Vec3;
 
+use super::build::Tree;
 use super::instance::Placed;
 use super::lanes::{Bits, Lanes};
 use super::triangle::{self, BlockHits, Shear};
 use super::wide::{Block, INSTANCE, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
 use super::{Hit, Ray};
-
-/// A borrowed tree.
-#[derive(Clone, Copy)]
-pub(super) struct TreeRef<'a> {
-    pub(super) nodes: &'a [Node],
-    pub(super) blocks: &'a [Block],
-    pub(super) placed: &'a [Placed],
-    pub(super) root: Reference,
-    /// Largest absolute coordinate of the scene.
-    pub(super) extent: f32,
-}
 
 /// A ray as the box test wants it.
 ///
@@ -180,7 +170,7 @@ fn distance(entry: u64) -> f32 {
 /// A tree of one of `LEVELS` has no instances.
 #[inline(always)]
 fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
-    tree: TreeRef<'_>,
+    tree: &Tree,
     ray: &Ray,
     mut visit: impl FnMut(&Block, &BlockHits) -> Option<f32>,
 ) {
@@ -188,6 +178,7 @@ fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
     if !usable || !ray.origin.is_finite() {
         return;
     }
+    let (nodes, blocks, placed) = (&tree.nodes[..], &tree.blocks[..], &tree.placed[..]);
     let world = BoxRay::new(ray, tree.extent, Vec3::ZERO);
     let shear = Shear::new(ray);
     let t_min = ray.t_min.max(0.0);
@@ -198,13 +189,13 @@ fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
     let mut inside: Option<(&Placed, BoxRay, usize)> = None;
     loop {
         if LEVELS > 1 && current & INSTANCE == INSTANCE {
-            let placed = &tree.placed[(current & !INSTANCE) as usize];
+            let placed = &placed[(current & !INSTANCE) as usize];
             let (there, slack) = placed.brought(ray, tree.extent);
             inside = Some((placed, BoxRay::new(&there, placed.extent, slack), stack.length));
             current = placed.root;
         }
         if current & LEAF != 0 {
-            let mut block = &tree.blocks[(current & !LEAF) as usize];
+            let mut block = &blocks[(current & !LEAF) as usize];
             let in_world;
             if LEVELS > 1
                 && let Some((placed, ..)) = &inside
@@ -220,7 +211,7 @@ fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
                 }
             }
         } else {
-            let node = &tree.nodes[current as usize];
+            let node = &nodes[current as usize];
             let mut boxes = &world;
             if LEVELS > 1
                 && let Some((_, there, _)) = &inside
@@ -253,7 +244,7 @@ fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
 /// See [`super::Bvh::closest_hit`].
 #[inline(always)]
 pub(super) fn closest_hit<L: Lanes, const LEVELS: usize>(
-    tree: TreeRef<'_>,
+    tree: &Tree,
     ray: &Ray,
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
@@ -276,7 +267,7 @@ pub(super) fn closest_hit<L: Lanes, const LEVELS: usize>(
 /// See [`super::Bvh::any_hit`].
 #[inline(always)]
 pub(super) fn any_hit<L: Lanes, const LEVELS: usize>(
-    tree: TreeRef<'_>,
+    tree: &Tree,
     ray: &Ray,
     mut blocks: impl FnMut(&Hit) -> bool,
 ) -> bool {

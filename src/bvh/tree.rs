@@ -6,12 +6,11 @@ use glam::Vec3;
 
 #[cfg(target_arch = "x86_64")]
 use super::avx2;
-use super::build;
-use super::instance::{InstanceWords, Placed, Shared};
+use super::build::{Tree, build};
+use super::instance::{InstanceWords, Shared};
 use super::lanes::Portable;
 use super::ray::{Hit, Ray};
-use super::traverse::{self, TreeRef};
-use super::wide::{Block, Node, Reference};
+use super::traverse;
 
 /// Which instructions the walk uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,13 +33,7 @@ impl Simd {
 /// Bounding volume hierarchy over the triangles of a scene.
 #[derive(Debug, Clone)]
 pub struct Bvh {
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
-    /// Its instances.
-    pub(super) placed: Vec<Placed>,
-    root: Reference,
-    bounds: (Vec3, Vec3),
-    extent: f32,
+    pub(super) tree: Tree,
     simd: Simd,
 }
 
@@ -56,10 +49,7 @@ impl Bvh {
     /// The same with meshes among the triangles that are met where their instances are, and a tree for
     /// each of them. Two levels are walked more slowly than one over copies of the triangles.
     pub fn with_instances(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'_>) -> Self {
-        let build::Tree { nodes, blocks, placed, root, bounds } =
-            build::build(positions, triangles, shared);
-        let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-        Self { nodes, blocks, placed, root, bounds, extent, simd: Simd::detect() }
+        Self { tree: build(positions, triangles, shared), simd: Simd::detect() }
     }
 
     /// This tree, walked without special instructions; for comparison.
@@ -74,10 +64,16 @@ impl Bvh {
     /// Triangles have no back side: culling, like alpha masks, is up to `accept`.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        if self.placed.is_empty() {
-            self.closest_of::<1>(ray, accept)
-        } else {
-            self.closest_of::<2>(ray, accept)
+        let Self { tree, simd } = self;
+        match (simd, tree.placed.is_empty()) {
+            (Simd::Portable, true) => traverse::closest_hit::<Portable, 1>(tree, ray, accept),
+            (Simd::Portable, false) => traverse::closest_hit::<Portable, 2>(tree, ray, accept),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            (Simd::Avx2, true) => unsafe { avx2::closest_hit::<1>(tree, ray, accept) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            (Simd::Avx2, false) => unsafe { avx2::closest_hit::<2>(tree, ray, accept) },
         }
     }
 
@@ -86,53 +82,34 @@ impl Bvh {
     /// Every hit is offered to `blocks` exactly once, in no particular order, until it returns true.
     #[inline]
     pub fn any_hit(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
-        if self.placed.is_empty() {
-            self.any_of::<1>(ray, blocks)
-        } else {
-            self.any_of::<2>(ray, blocks)
-        }
-    }
-
-    #[inline(always)]
-    fn closest_of<const LEVELS: usize>(
-        &self,
-        ray: &Ray,
-        accept: impl Fn(&Hit) -> bool,
-    ) -> Option<Hit> {
-        match self.simd {
-            Simd::Portable => traverse::closest_hit::<Portable, LEVELS>(self.tree(), ray, accept),
+        let Self { tree, simd } = self;
+        match (simd, tree.placed.is_empty()) {
+            (Simd::Portable, true) => traverse::any_hit::<Portable, 1>(tree, ray, blocks),
+            (Simd::Portable, false) => traverse::any_hit::<Portable, 2>(tree, ray, blocks),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            Simd::Avx2 => unsafe { avx2::closest_hit::<LEVELS>(self.tree(), ray, accept) },
-        }
-    }
-
-    #[inline(always)]
-    fn any_of<const LEVELS: usize>(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
-        match self.simd {
-            Simd::Portable => traverse::any_hit::<Portable, LEVELS>(self.tree(), ray, blocks),
+            (Simd::Avx2, true) => unsafe { avx2::any_hit::<1>(tree, ray, blocks) },
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            Simd::Avx2 => unsafe { avx2::any_hit::<LEVELS>(self.tree(), ray, blocks) },
+            // SAFETY: as above.
+            (Simd::Avx2, false) => unsafe { avx2::any_hit::<2>(tree, ray, blocks) },
         }
     }
 
     /// Lower and upper corner of the box around all triangles (for instances, around boxes of parts
     /// of them); both zero if there are none.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        self.bounds
+        self.tree.bounds
     }
 
     /// Bytes of the tree and its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice())
-            + size_of_val(self.blocks.as_slice())
-            + size_of_val(self.placed.as_slice())
+        let Tree { nodes, blocks, placed, .. } = &self.tree;
+        size_of_val(&nodes[..]) + size_of_val(&blocks[..]) + size_of_val(&placed[..])
     }
 
     /// Its instances as a GPU reads them; `root_of` tells where the root of a mesh's tree is there.
     pub(crate) fn instance_words(&self, root_of: impl Fn(u32) -> u32) -> Vec<InstanceWords> {
-        self.placed.iter().map(|placed| placed.words(root_of(placed.mesh))).collect()
+        self.tree.placed.iter().map(|placed| placed.words(root_of(placed.mesh))).collect()
     }
 
     /// Name of the instructions in use, for logs.
@@ -141,17 +118,6 @@ impl Bvh {
             Simd::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2 => "AVX2+FMA",
-        }
-    }
-
-    #[inline(always)]
-    fn tree(&self) -> TreeRef<'_> {
-        TreeRef {
-            nodes: &self.nodes,
-            blocks: &self.blocks,
-            placed: &self.placed,
-            root: self.root,
-            extent: self.extent,
         }
     }
 }
