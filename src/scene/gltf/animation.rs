@@ -29,15 +29,7 @@ struct Animation {
 pub(super) struct Channels<'a> {
     file: &'a File<'a>,
     /// Of each node and property, by the first animation that has it.
-    samplers: BTreeMap<(u32, u8), Keys>,
-}
-
-/// Where the keys of a property are, and what happens between them.
-#[derive(Clone, Copy)]
-struct Keys {
-    times: Index<json::Accessor>,
-    values: Index<json::Accessor>,
-    interpolation: Checked<Written>,
+    samplers: BTreeMap<(u32, u8), Sampler>,
 }
 
 impl<'a> Channels<'a> {
@@ -52,8 +44,7 @@ impl<'a> Channels<'a> {
                 let Checked::Valid(property) = channel.target.path else { continue };
                 if let Some(sampler) = animation.samplers.get(channel.sampler.value()) {
                     let target = (channel.target.node.value() as u32, property as u8);
-                    let &Sampler { input: times, output: values, interpolation, .. } = sampler;
-                    samplers.entry(target).or_insert(Keys { times, values, interpolation });
+                    samplers.entry(target).or_insert_with(|| sampler.clone());
                 }
             }
         }
@@ -86,43 +77,36 @@ impl<'a> Channels<'a> {
 
     /// A node of which something is animated.
     fn moving(&self, number: Index<json::Node>, node: &json::Node) -> Fallible<Option<Link>> {
-        let translation = self.track::<3>(number, Property::Translation)?;
-        let rotation = self.track::<4>(number, Property::Rotation)?;
-        let scale = self.track::<3>(number, Property::Scale)?;
-        let is_still = translation.is_none() && rotation.is_none() && scale.is_none();
-        if is_still || node.matrix.is_some() {
+        let target = |property: Property| (number.value() as u32, property as u8);
+        let [translation, rotation, scale] =
+            [Property::Translation, Property::Rotation, Property::Scale].map(target);
+        if ![translation, rotation, scale].iter().any(|it| self.samplers.contains_key(it)) {
             return Ok(None);
         }
-        let at_rest = |value: Option<[f32; 3]>, default| {
-            Track::constant(value.map_or(default, |value| value.map(f64::from)))
+        let link = Link::Moving {
+            translation: self.track(translation, node.translation.unwrap_or([0.0; 3]))?,
+            rotation: self.track(rotation, node.rotation.unwrap_or_default().0)?,
+            scale: self.track(scale, node.scale.unwrap_or([1.0; 3]))?,
         };
-        let turned = node.rotation.unwrap_or_default().0.map(f64::from);
-        Ok(Some(Link::Moving {
-            translation: translation.unwrap_or_else(|| at_rest(node.translation, [0.0; 3])),
-            rotation: rotation.unwrap_or_else(|| Track::constant(turned)),
-            scale: scale.unwrap_or_else(|| at_rest(node.scale, [1.0; 3])),
-        }))
+        Ok(Some(link).filter(|_| node.matrix.is_none()))
     }
 
-    /// The keys of one property of a node, if it is animated.
-    fn track<const N: usize>(
-        &self,
-        node: Index<json::Node>,
-        property: Property,
-    ) -> Fallible<Option<Track<N>>> {
-        let target = (node.value() as u32, property as u8);
-        let Some(keys) = self.samplers.get(&target) else { return Ok(None) };
+    /// The keys of one property of a node, which is `at_rest` if it is not animated.
+    fn track<const N: usize>(&self, target: (u32, u8), at_rest: [f32; N]) -> Fallible<Track<N>> {
+        let Some(keys) = self.samplers.get(&target) else {
+            return Ok(Track::constant(at_rest.map(f64::from)));
+        };
         let interpolation = match keys.interpolation {
             Checked::Valid(Written::Linear) => Interpolation::Linear,
             Checked::Valid(Written::Step) => Interpolation::Step,
             Checked::Valid(Written::CubicSpline) => Interpolation::Cubic,
             Checked::Invalid => return Err("its interpolation is unknown to glTF 2.0".into()),
         };
-        let times = Elements::open(self.file, keys.times, &[Type::Scalar])?;
-        let values = Elements::open(self.file, keys.values, &[Type::Vec3, Type::Vec4])?;
+        let times = Elements::open(self.file, keys.input, &[Type::Scalar])?;
+        let values = Elements::open(self.file, keys.output, &[Type::Vec3, Type::Vec4])?;
         let times = (0..times.count).map(|key| times.floats::<1>(key)[0].into()).collect();
         let values = (0..values.count).map(|key| values.floats::<N>(key).map(f64::from)).collect();
         let track = Track::new(times, values, interpolation);
-        track.map(Some).ok_or_else(|| "its keys do not rise or have no values".into())
+        track.ok_or_else(|| "its keys do not rise or have no values".into())
     }
 }
