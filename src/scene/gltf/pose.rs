@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 use gltf::json;
 use json::Index;
 use json::accessor::Type;
@@ -266,7 +266,7 @@ fn scene_roots(
 /// Parent from node, at rest.
 pub(super) fn local_transform(node: &json::Node) -> DAffine3 {
     if let Some(m) = node.matrix {
-        return affine_from_columns(&m.map(f64::from));
+        return DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from)));
     }
     let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vec3::from(v).as_dvec3());
     let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
@@ -283,12 +283,6 @@ pub(super) fn local_transform(node: &json::Node) -> DAffine3 {
 pub(super) fn own_mirror(node: &json::Node) -> DAffine3 {
     let scale = node.scale.filter(|_| node.matrix.is_none()).unwrap_or([1.0; 3]);
     DAffine3::from_scale(Vec3::from(scale).signum().as_dvec3())
-}
-
-/// Affine part of a column-major 4x4 matrix; its last row is (0, 0, 0, 1) by the specification.
-fn affine_from_columns(m: &[f64; 16]) -> DAffine3 {
-    let column = |c: usize| DVec3::new(m[4 * c], m[4 * c + 1], m[4 * c + 2]);
-    DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
 }
 
 /// `EXT_mesh_gpu_instancing`: transforms of the instances in the node's space, if it has any.
@@ -348,7 +342,8 @@ pub(super) fn joint_transforms(
     }
     let transform = |(joint, &node): (usize, &Index<json::Node>)| {
         let bind = inverse_bind.as_ref().map_or(DAffine3::IDENTITY, |matrices| {
-            affine_from_columns(&matrices.floats::<16>(joint).map(f64::from))
+            let columns = matrices.floats(joint).map(f64::from);
+            DAffine3::from_mat4(DMat4::from_cols_array(&columns))
         });
         nodes.world(node) * bind
     };
