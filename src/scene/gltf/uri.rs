@@ -202,50 +202,35 @@ fn read_data_uri(uri: &str) -> Fallible<Vec<u8>> {
 
 /// RFC 3986 percent-decoding; a `%` that does not begin an escape is kept.
 fn percent_decoded(text: &str) -> Vec<u8> {
+    let mut parts = text.split('%');
     let mut decoded = Vec::with_capacity(text.len());
-    let mut rest = text.as_bytes();
-    while let [first, tail @ ..] = rest {
-        let escape = match rest {
-            [b'%', high, low, ..] => hex_digit(*high).zip(hex_digit(*low)),
-            _ => None,
-        };
-        if let Some((high, low)) = escape {
-            decoded.push(high << 4 | low);
-            rest = &rest[3..];
-        } else {
-            decoded.push(*first);
-            rest = tail;
-        }
+    decoded.extend(parts.next().unwrap_or_default().bytes());
+    for part in parts {
+        let is_hex = |digits: &&str| digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let digits = part.get(..2).filter(is_hex);
+        let escaped = digits.and_then(|digits| u8::from_str_radix(digits, 16).ok());
+        decoded.push(escaped.unwrap_or(b'%'));
+        decoded.extend(part.bytes().skip(2 * usize::from(escaped.is_some())));
     }
     decoded
 }
 
-fn hex_digit(digit: u8) -> Option<u8> {
-    char::from(digit).to_digit(16).and_then(|value| u8::try_from(value).ok())
-}
-
 /// RFC 4648 base64, both alphabets, padding optional, white space passed over.
 fn base64_decoded(text: &[u8]) -> Option<Vec<u8>> {
+    let is_space = |symbol: &u8| b" \n\r\t".contains(symbol);
+    let last = text.iter().rposition(|symbol| *symbol != b'=' && !is_space(symbol));
+    let text = &text[..last.map_or(0, |last| last + 1)];
     let mut decoded = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut bits, mut count) = (0_u32, 0);
-    let mut ended = false;
-    for &symbol in text {
+    for &symbol in text.iter().filter(|symbol| !is_space(symbol)) {
         let value = match symbol {
             b'A'..=b'Z' => symbol - b'A',
             b'a'..=b'z' => symbol - b'a' + 26,
             b'0'..=b'9' => symbol - b'0' + 52,
             b'+' | b'-' => 62,
             b'/' | b'_' => 63,
-            b'=' => {
-                ended = true;
-                continue;
-            }
-            b' ' | b'\n' | b'\r' | b'\t' => continue,
             _ => return None,
         };
-        if ended {
-            return None;
-        }
         bits = bits << 6 | u32::from(value);
         count += 6;
         if count >= 8 {
