@@ -49,7 +49,15 @@ impl Materials {
                 None => Material { name: "default".to_owned(), ..Material::default() },
                 Some(number) => {
                     let source = file.document.materials.get(json::Index::new(number))?;
-                    let mut reader = Reader::new(file, &source, number, &mut wanted, notices);
+                    let name = source.name.clone();
+                    let name = name.unwrap_or_else(|| format!("material {number}"));
+                    let mut reader = Reader {
+                        document: &file.document,
+                        material: Material { name, ..Material::default() },
+                        glossiness: None,
+                        wanted: &mut wanted,
+                        notices,
+                    };
                     reader.read(&source).map_err(|cause| {
                         format!("material {number} ({}): {cause}", reader.material.name)
                     })?;
@@ -157,18 +165,6 @@ pub(super) struct Reader<'a> {
 type ReadExtension<'a> = fn(&mut Reader<'a>, &Object) -> Fallible<()>;
 
 impl<'a> Reader<'a> {
-    fn new(
-        file: &'a File<'_>,
-        source: &json::Material,
-        number: u32,
-        wanted: &'a mut Wanted,
-        notices: &'a mut Notices,
-    ) -> Self {
-        let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
-        let material = Material { name, ..Material::default() };
-        Self { document: &file.document, material, glossiness: None, wanted, notices }
-    }
-
     fn read(&mut self, source: &json::Material) -> Fallible<()> {
         let pbr = &source.pbr_metallic_roughness;
         self.material = Material {

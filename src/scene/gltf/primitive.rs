@@ -276,15 +276,14 @@ impl<'a> Source<'a> {
         let mut is_morphed = false;
         for (target, &weight) in morph.0.iter().zip(morph.1).filter(|(_, weight)| **weight != 0.0) {
             is_morphed = true;
-            let shift = Shift { source: self, weight };
-            shift.add(target.position, VEC3, &mut part.positions)?;
-            shift.add(target.normal, VEC3, &mut part.normals)?;
+            self.add(weight, target.position, VEC3, &mut part.positions)?;
+            self.add(weight, target.normal, VEC3, &mut part.normals)?;
             let [first, second] = &mut part.uvs;
-            shift.add(target.texcoord_0, VEC2, first)?;
-            shift.add(target.texcoord_1, VEC2, second)?;
-            shift.add(target.color_0, COLOR, &mut part.colors)?;
+            self.add(weight, target.texcoord_0, VEC2, first)?;
+            self.add(weight, target.texcoord_1, VEC2, second)?;
+            self.add(weight, target.color_0, COLOR, &mut part.colors)?;
             let mut directions: Vec<Vec3> = part.tangents.iter().map(|t| t.truncate()).collect();
-            shift.add(target.tangent, VEC3, &mut directions)?;
+            self.add(weight, target.tangent, VEC3, &mut directions)?;
             for (tangent, direction) in part.tangents.iter_mut().zip(directions) {
                 *tangent = direction.extend(tangent.w);
             }
@@ -299,17 +298,11 @@ impl<'a> Source<'a> {
         }
         Ok(())
     }
-}
 
-/// What a morph target adds to some vertices.
-struct Shift<'a> {
-    source: &'a Source<'a>,
-    weight: f32,
-}
-
-impl Shift<'_> {
+    /// Adds what a morph target of some weight has for its vertices.
     fn add<const N: usize, V>(
         &self,
+        weight: f32,
         accessor: Option<json::Index<json::Accessor>>,
         types: &[Type],
         values: &mut [V],
@@ -318,10 +311,10 @@ impl Shift<'_> {
         V: From<[f32; N]> + AddAssign + Mul<f32, Output = V>,
     {
         let Some(accessor) = accessor else { return Ok(()) };
-        let elements = Elements::open(self.source.file, accessor, types)?;
-        let elements = self.source.per_vertex((accessor, elements))?;
-        for (value, &vertex) in values.iter_mut().zip(&self.source.vertices) {
-            *value += V::from(elements.floats(vertex as usize)) * self.weight;
+        let elements = Elements::open(self.file, accessor, types)?;
+        let elements = self.per_vertex((accessor, elements))?;
+        for (value, &vertex) in values.iter_mut().zip(&self.vertices) {
+            *value += V::from(elements.floats(vertex as usize)) * weight;
         }
         Ok(())
     }
