@@ -24,11 +24,13 @@ impl Channels {
     }
 }
 
-/// A part of the file and the channels of it that are read.
-#[derive(Debug, Clone, Copy)]
+/// One way to read a file: a part of it and channels of that.
 pub(crate) struct Selection {
     pub(crate) part: usize,
     pub(crate) channels: Channels,
+    /// How far it is from the plainest (0).
+    rank: u32,
+    layer: String,
 }
 
 /// Layer names that denote the finished picture, as Blender, Nuke and others write them.
@@ -54,37 +56,28 @@ pub(crate) fn select(headers: &[Header], notices: &mut Notices) -> Decoded<Selec
         notices.add(format!(
             "of the {} parts of the file, only '{}' is read",
             headers.len(),
-            part_name(&headers[best.selection.part])
+            part_name(&headers[best.part])
         ));
     }
-    let Channels::Grey(index) = best.selection.channels else {
+    let Channels::Grey(index) = best.channels else {
         if !best.layer.is_empty() {
             notices.add(format!("the layer '{}' of the file is read", best.layer));
         }
-        return Ok(best.selection);
+        return Ok(best);
     };
-    let name = headers[best.selection.part].channels.list[index].name.to_string();
+    let name = headers[best.part].channels.list[index].name.to_string();
     notices.add(format!("the file has no RGB channels; its channel '{name}' is read as grey"));
-    Ok(best.selection)
-}
-
-/// One way to read a part, and how far it is from the plainest (0).
-struct Candidate {
-    rank: u32,
-    layer: String,
-    selection: Selection,
+    Ok(best)
 }
 
 /// All ways to read one part, layer by layer.
-fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Candidate> {
+fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Selection> {
     let names: Vec<(String, String)> = header.channels.list.iter().map(layer_and_name).collect();
     let mut layers: Vec<&str> = names.iter().map(|(layer, _)| layer.as_str()).collect();
     layers.dedup();
     let part_is_picture = is_picture_name(&part_name(header));
-    let candidate = |rank, layer: &str, channels| {
-        let selection = Selection { part, channels };
-        Candidate { rank, layer: layer.to_owned(), selection }
-    };
+    let candidate =
+        |rank, layer: &str, channels| Selection { part, channels, rank, layer: layer.to_owned() };
     let mut found = Vec::new();
     for layer in layers {
         let index = |wanted: &[&str]| {

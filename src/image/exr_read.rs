@@ -9,7 +9,9 @@ use exr::block::reader::{ChunksReader, Reader as ChunkReader};
 use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, ChannelList, IntegerBounds, SampleType};
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, ChannelList, IntegerBounds, SampleType,
+};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
 use glam::{DVec2, Mat3, Vec3};
@@ -19,27 +21,20 @@ use super::exr_channels::{Channels, select};
 use super::exr_patch::patch;
 use super::file::{open_file, read_cause, read_file};
 use super::guard::guarded;
+use super::picture::FilePicture;
 use super::primaries::{Primaries, REC709, rec709_conversion};
 use super::{Image, Rgb8, check_size};
 use crate::error::{At as _, Decoded, Error, Notices, Result};
 use crate::memory;
 
-/// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.
-pub(crate) struct Exr {
-    pub(crate) image: Image,
-    pub(crate) notices: Notices,
-    /// Whether the file says that it holds the six faces of a cube.
-    pub(crate) is_cube_map: bool,
-}
-
-/// Reads the picture of an OpenEXR file: see [`select`] for which part and channels that is. Of a
+/// Reads linear Rec.709 pixels of an OpenEXR file: see [`select`] for which part and channels that is. Of a
 /// tiled file with levels the largest is read. Pixels of the display window outside the data window
 /// are black.
 ///
 /// # Errors
 /// One sentence: missing, damaged, too large, or of a kind that is not read (deep, an unknown
 /// compression).
-pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
+pub(crate) fn read_exr(path: &Path) -> Result<FilePicture> {
     let (file, file_bytes) = open_file(path).at(path)?;
     let decoded =
         || match ChunkReader::read_from_buffered(BufReader::with_capacity(1 << 20, file), false) {
@@ -114,7 +109,7 @@ fn decode<R: Read + Seek>(
     reader: ChunkReader<R>,
     file_bytes: u64,
     sampling: Option<Vec<[usize; 2]>>,
-) -> Decoded<Exr> {
+) -> Decoded<FilePicture> {
     check_plausible(reader.headers(), file_bytes)?;
     let mut notices = Notices::default();
     let selection = select(reader.headers(), &mut notices)?;
@@ -128,7 +123,8 @@ fn decode<R: Read + Seek>(
     let adopted = header.own_attributes.adopted_neutral.map(point);
     let block_decoder = BlockDecoder {
         channels: selection.channels,
-        layout: ChannelLayout::of(&header),
+        layout: layout(&header),
+        bytes_per_pixel: header.channels.bytes_per_pixel,
         sampling,
         weights: primaries.unwrap_or(Primaries(REC709)).luminance(),
         to_rec709: primaries
@@ -166,7 +162,7 @@ fn decode<R: Read + Seek>(
     if block_decoder.sampling.is_some() {
         block_decoder.hold(&mut image);
     }
-    Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
+    Ok(FilePicture { image, notices, is_linear: true, is_cube_map: is_cube_map(&header) })
 }
 
 /// A chromaticity `xy`.
@@ -284,57 +280,38 @@ struct Block {
     pixels: Vec<[f32; 3]>,
 }
 
-/// Sample type of each channel, and where its samples lie in the rows of a block.
-struct ChannelLayout {
-    /// Type, and bytes per pixel of all channels before.
-    channels: Vec<(SampleType, usize)>,
-    bytes_per_pixel: usize,
+fn layout(header: &Header) -> Vec<(SampleType, usize)> {
+    let mut end = 0;
+    let of = |channel: &ChannelDescription| {
+        end += channel.sample_type.bytes_per_sample();
+        (channel.sample_type, end - channel.sample_type.bytes_per_sample())
+    };
+    header.channels.list.iter().map(of).collect()
 }
 
-impl ChannelLayout {
-    fn of(header: &Header) -> Self {
-        let mut bytes_per_pixel = 0;
-        let channels = header
-            .channels
-            .list
-            .iter()
-            .map(|channel| {
-                let before = bytes_per_pixel;
-                bytes_per_pixel += channel.sample_type.bytes_per_sample();
-                (channel.sample_type, before)
-            })
-            .collect();
-        Self { channels, bytes_per_pixel }
-    }
-
-    /// Hands `count` samples of one channel (native byte order) to `put`, left to right.
-    fn for_each(
-        &self,
-        channel: usize,
-        count: usize,
+/// Hands `count` samples of one channel (native byte order) to `put`, left to right.
+fn for_each(sample_type: SampleType, count: usize, bytes: &[u8], put: impl FnMut(usize, f32)) {
+    fn each<const N: usize>(
         bytes: &[u8],
+        of: impl Fn([u8; N]) -> f32,
         mut put: impl FnMut(usize, f32),
     ) {
-        let (sample_type, _) = self.channels[channel];
-        let bytes = &bytes[..sample_type.bytes_per_sample() * count];
-        match sample_type {
-            SampleType::F16 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
-                put(i, f16::from_ne_bytes(*b).to_f32());
-            }),
-            SampleType::F32 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
-                put(i, f32::from_ne_bytes(*b));
-            }),
-            SampleType::U32 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
-                put(i, u32::from_ne_bytes(*b) as f32);
-            }),
-        }
+        bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| put(i, of(*b)));
+    }
+    let bytes = &bytes[..sample_type.bytes_per_sample() * count];
+    match sample_type {
+        SampleType::F16 => each(bytes, |b| f16::from_ne_bytes(b).to_f32(), put),
+        SampleType::F32 => each(bytes, f32::from_ne_bytes, put),
+        SampleType::U32 => each(bytes, |b| u32::from_ne_bytes(b) as f32, put),
     }
 }
 
 /// Turns compressed chunks into linear Rec.709 pixels.
 struct BlockDecoder {
     channels: Channels,
-    layout: ChannelLayout,
+    /// Type, and bytes per pixel of all channels before, of each channel.
+    layout: Vec<(SampleType, usize)>,
+    bytes_per_pixel: usize,
     /// Set if channels have lower resolutions: pixels that a sample of each stands for.
     sampling: Option<Vec<[usize; 2]>>,
     /// Luminance of the file's own red, green and blue.
@@ -352,11 +329,12 @@ impl BlockDecoder {
                 .map_err(|e| decode_cause(&e))?;
             let Vec2(width, height) = block.index.pixel_size;
             let mut pixels = vec![[0.0; 3]; width * height];
-            let rows = block.data.chunks_exact(width * self.layout.bytes_per_pixel);
+            let rows = block.data.chunks_exact(width * self.bytes_per_pixel);
             for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
                 for (i, channel) in self.channels.indices().into_iter().enumerate() {
-                    let before = self.layout.channels[channel].1 * width;
-                    self.layout.for_each(channel, width, &row[before..], |x, v| pixels[x][i] = v);
+                    let (sample_type, before) = self.layout[channel];
+                    let row = &row[before * width..];
+                    for_each(sample_type, width, row, |x, v| pixels[x][i] = v);
                 }
             }
             let Vec2(x, y) = block.index.pixel_position;
@@ -387,7 +365,7 @@ impl BlockDecoder {
         let lines: Vec<(usize, [usize; 2], usize)> = (0..)
             .zip(sampling)
             .map(|(channel, &step)| {
-                let (sample_type, _) = self.layout.channels[channel];
+                let (sample_type, _) = self.layout[channel];
                 let samples = width / step[0].max(1);
                 (channel, step, samples * sample_type.bytes_per_sample())
             })
@@ -436,7 +414,7 @@ impl BlockDecoder {
                 let (samples, after) = rest.split_at_checked(bytes).ok_or_else(damaged)?;
                 rest = after;
                 for i in (0..3).filter(|i| self.channels.indices().get(*i) == Some(&channel)) {
-                    self.layout.for_each(channel, width / step[0], samples, |x, v| {
+                    for_each(self.layout[channel].0, width / step[0], samples, |x, v| {
                         line[x * step[0]..][..step[0]].iter_mut().for_each(|pixel| pixel[i] = v);
                     });
                 }

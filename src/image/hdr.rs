@@ -2,6 +2,7 @@
 //!
 //! Format: Greg Ward, "Real Pixels", Graphics Gems II; Radiance's `color.c` and `resolu.c`.
 
+use super::picture::FilePicture;
 use super::primaries::{Primaries, rec709_conversion};
 use super::{Image, check_size};
 use crate::color::REC709_FROM_XYZ;
@@ -15,7 +16,7 @@ use glam::{DVec2, Mat3, Vec3};
 /// # Errors
 /// The cause, without the file's name: no Radiance header, an unknown pixel format or resolution
 /// line, an implausible size, damaged or missing rows.
-pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
+pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<FilePicture> {
     let mut rest = bytes;
     let mut notices = Notices::default();
     let header = Header::parse(&mut rest, &mut notices)?;
@@ -25,8 +26,8 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
         return Err(format!(
             "is cut short: {} bytes cannot hold {} x {} pixels",
             rest.len(),
-            header.width(),
-            header.height()
+            header.width,
+            header.height
         ));
     }
     let decoder = PixelDecoder::new(&header, &mut notices);
@@ -46,7 +47,8 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
-    Ok((header.upright(pixels), notices))
+    let image = header.upright(pixels);
+    Ok(FilePicture { image, notices, is_linear: true, is_cube_map: false })
 }
 
 /// Most pixels that a byte of new run lengths stands for: 127 in two bytes for each of four channels.
@@ -88,6 +90,8 @@ struct Header {
     /// The axis of whole lines, then the axis along a line.
     major: Axis,
     minor: Axis,
+    width: u32,
+    height: u32,
 }
 
 impl Header {
@@ -137,12 +141,14 @@ impl Header {
         }
         let line = text_line(rest).ok_or("has no resolution line")?;
         let (major, minor) = parse_resolution(&line)?;
-        Ok(Self { is_xyz, exposure, primaries, major, minor })
+        let (columns, rows) = if major.is_y { (minor, major) } else { (major, minor) };
+        let (width, height) = check_size(columns.count, rows.count)?;
+        Ok(Self { is_xyz, exposure, primaries, major, minor, width, height })
     }
 
     /// The picture of pixels in file order.
     fn upright(&self, pixels: Vec<[f32; 3]>) -> Image {
-        let (major, minor, width, height) = (self.major, self.minor, self.width(), self.height());
+        let &Self { major, minor, width, height, .. } = self;
         if major.is_y && !major.reversed && !minor.reversed {
             return Image { width, height, pixels };
         }
@@ -155,14 +161,6 @@ impl Header {
             }
         }
         image
-    }
-
-    fn width(&self) -> u32 {
-        (if self.major.is_y { self.minor.count } else { self.major.count }) as u32
-    }
-
-    fn height(&self) -> u32 {
-        (if self.major.is_y { self.major.count } else { self.minor.count }) as u32
     }
 }
 
@@ -187,13 +185,10 @@ fn parse_resolution(line: &str) -> Decoded<(Axis, Axis)> {
         [a, n, b, m] => Axis::parse(a, n).zip(Axis::parse(b, m)),
         _ => None,
     };
-    let Some((major, minor)) = axes.filter(|(major, minor)| major.is_y != minor.is_y) else {
+    axes.filter(|(major, minor)| major.is_y != minor.is_y).ok_or_else(|| {
         let start: String = line.chars().take(40).collect();
-        return Err(format!("has no resolution like '-Y 512 +X 1024' but '{start}'"));
-    };
-    let (columns, rows) = if major.is_y { (minor, major) } else { (major, minor) };
-    check_size(columns.count, rows.count)?;
-    Ok((major, minor))
+        format!("has no resolution like '-Y 512 +X 1024' but '{start}'")
+    })
 }
 
 /// Four bytes to linear RGB.

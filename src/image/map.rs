@@ -7,11 +7,12 @@ use std::path::Path;
 use image::ImageDecoder as _;
 use rayon::prelude::*;
 
-use super::exr_read::{Exr, read_exr};
+use super::exr_read::read_exr;
 use super::file::{extension, open_file, read_cause, read_file};
 use super::guard::{decoder_bytes, guarded};
 use super::hdr::decode_hdr;
 use super::ldr::decoder_cause;
+use super::picture::FilePicture;
 use super::{Image, MAX_PIXELS, MAX_SIDE, check_size, tiff};
 use crate::color::linear_from_srgb;
 use crate::error::{At as _, Decoded, Error, Notices, Result};
@@ -35,16 +36,10 @@ pub struct LoadedMap {
 /// One sentence: the file is missing, damaged, of a kind that is not read, too large, or an OpenEXR
 /// cube map.
 pub fn read_map(path: &Path) -> Result<LoadedMap> {
-    let LoadedMap { mut image, mut notices } = match format_of(path)? {
-        Format::Exr => match read_exr(path)? {
-            Exr { is_cube_map: true, .. } => {
-                return Err(Error::at(path, "is a cube map, lightgrid reads lat-long maps"));
-            }
-            Exr { image, notices, .. } => LoadedMap { image, notices },
-        },
-        Format::Hdr => read_hdr(path)?,
-        Format::Other => read_ldr_map(path)?.0,
-    };
+    let FilePicture { mut image, mut notices, is_cube_map, .. } = read(path)?;
+    if is_cube_map {
+        return Err(Error::at(path, "is a cube map, lightgrid reads lat-long maps"));
+    }
     notices.extend(&sanitise(&mut image));
     if image.width != 2 * image.height {
         notices.add(format!(
@@ -69,14 +64,7 @@ pub fn read_picture(path: &Path) -> Result<Image> {
 /// # Errors
 /// As [`read_map`].
 pub fn read_with_linearity(path: &Path) -> Result<(Image, bool)> {
-    Ok(match format_of(path)? {
-        Format::Exr => (read_exr(path)?.image, true),
-        Format::Hdr => (read_hdr(path)?.image, true),
-        Format::Other => {
-            let (map, is_linear) = read_ldr_map(path)?;
-            (map.image, is_linear)
-        }
-    })
+    read(path).map(|picture| (picture.image, picture.is_linear))
 }
 
 /// Whether these are the first bytes of a glTF scene.
@@ -171,14 +159,8 @@ impl Defects {
 const KNOWN: &str = "EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, TGA";
 
 /// Who decodes a file.
-enum Format {
-    Exr,
-    Hdr,
-    Other,
-}
-
-/// Tells the format by the first bytes, else by the extension.
-fn format_of(path: &Path) -> Result<Format> {
+/// Reads by the format that the first bytes tell, else the extension.
+fn read(path: &Path) -> Result<FilePicture> {
     /// No format takes more bytes to be told.
     const START: u64 = 16;
     let (file, _) = open_file(path).at(path)?;
@@ -191,27 +173,25 @@ fn format_of(path: &Path) -> Result<Format> {
         return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
     }
     let told = image::guess_format(&start).ok();
-    Ok(match (told, extension(path).as_deref()) {
-        (Some(image::ImageFormat::OpenExr), _) => Format::Exr,
-        _ if start.starts_with(b"#?") => Format::Hdr,
+    match (told, extension(path).as_deref()) {
+        (Some(image::ImageFormat::OpenExr), _) => read_exr(path),
+        _ if start.starts_with(b"#?") => read_hdr(path),
         (Some(other), _) if !other.reading_enabled() => {
             let name = format!("{other:?}").to_uppercase();
-            return Err(Error::at(path, format!("is of the format {name}, not one of {KNOWN}")));
+            Err(Error::at(path, format!("is of the format {name}, not one of {KNOWN}")))
         }
-        (Some(_), _) => Format::Other,
-        (None, Some("exr")) => Format::Exr,
-        (None, Some("hdr" | "rgbe" | "pic" | "xyze")) => Format::Hdr,
-        (None, _) => Format::Other,
-    })
+        (None, Some("exr")) => read_exr(path),
+        (None, Some("hdr" | "rgbe" | "pic" | "xyze")) => read_hdr(path),
+        _ => read_developed(path),
+    }
 }
 
-fn read_hdr(path: &Path) -> Result<LoadedMap> {
-    let (image, notices) = read_file(path).and_then(|bytes| decode_hdr(&bytes)).at(path)?;
-    Ok(LoadedMap { image, notices })
+fn read_hdr(path: &Path) -> Result<FilePicture> {
+    read_file(path).and_then(|bytes| decode_hdr(&bytes)).at(path)
 }
 
-/// Reads an sRGB-encoded picture, or a float TIFF as it is; whether it is the latter.
-fn read_ldr_map(path: &Path) -> Result<(LoadedMap, bool)> {
+/// Reads an sRGB-encoded picture, or a float TIFF as it is.
+fn read_developed(path: &Path) -> Result<FilePicture> {
     let decoded = guarded(|| decode_ldr_file(path)).at(path)?;
     let mut notices = Notices::default();
     let (width, height) = (decoded.width(), decoded.height());
@@ -232,7 +212,8 @@ fn read_ldr_map(path: &Path) -> Result<(LoadedMap, bool)> {
     if bits < 32 {
         notices.add(format!("the map is {bits}-bit sRGB: it holds no lights brighter than white"));
     }
-    Ok((LoadedMap { image: Image { width, height, pixels }, notices }, bits == 32))
+    let image = Image { width, height, pixels };
+    Ok(FilePicture { image, notices, is_linear: bits == 32, is_cube_map: false })
 }
 
 /// Most that a pixel takes: four floats.

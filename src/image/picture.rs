@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::Decoded;
+use crate::error::{Decoded, Notices};
 use crate::memory;
 
 /// A picture: linear Rec.709 radiance, row 0 at the top.
@@ -100,6 +100,16 @@ pub struct Rgb8 {
     pub height: u32,
     /// `width * height` RGB triples, row after row.
     pub pixels: Vec<[u8; 3]>,
+}
+
+/// A picture as a file has it, not repaired in any way.
+pub(crate) struct FilePicture {
+    pub(crate) image: Image,
+    pub(crate) notices: Notices,
+    /// Whether its values are linear rather than what was made of them for a display.
+    pub(crate) is_linear: bool,
+    /// Whether the file says that it holds the six faces of a cube.
+    pub(crate) is_cube_map: bool,
 }
 
 /// Most pixels a picture may have: 16384 x 16384, 3.2 GB of RGB.
