@@ -14,8 +14,8 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::edges;
-use super::guides::{Guides, around};
-use super::light::{Light, MAX_VARIANCE, Row, compared_luminance};
+use super::guides::{Guides, around, rows};
+use super::light::{Light, MAX_VARIANCE, compared_luminance};
 use super::samples::Samples;
 use crate::image::Image;
 
@@ -176,7 +176,8 @@ fn square(reach: isize) -> impl Iterator<Item = [isize; 2]> {
 /// One pass with taps that are `step` pixels apart.
 fn filtered(light: &Light, guides: &Guides, step: isize) -> Light {
     let mut result = Light::black(light.luminance.len());
-    let rows = result.rows(guides.width);
+    let Light { rgb: [r, g, b], luminance, variance } = &mut result;
+    let rows = rows([r, g, b, luminance, variance], guides.width);
     let lanes = Arch::new();
     let filter = |row| lanes.dispatch(|| filter_row(light, guides, row, step));
     rows.into_par_iter().enumerate().for_each(filter);
@@ -185,10 +186,8 @@ fn filtered(light: &Light, guides: &Guides, step: isize) -> Light {
 
 /// In-lined, as is what it calls, into code for the widest lanes there are.
 #[inline(always)]
-fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), step: isize) {
+fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, [&mut [f32]; 5]), step: isize) {
     let width = guides.width;
-    // Until the end the sum of weights.
-    let total = &mut *row.luminance;
     let mut weights = vec![0.0; width];
     let mut squares = vec![0.0; width];
     for [dx, dy] in square(2) {
@@ -205,10 +204,10 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
         }
         let [r, g, b] = light.rgb.each_ref().map(|plane| &plane[there..there + count]);
         let variance = &light.variance[there..there + count];
-        let [to_r, to_g, to_b] = row.rgb.each_mut().map(|plane| &mut plane[columns.clone()]);
-        let to_variance = &mut row.variance[columns.clone()];
-        let squares = &mut squares[columns.clone()];
-        let total = &mut total[columns];
+        // Luminances are sums of weights until the end.
+        let [to_r, to_g, to_b, total, to_variance] =
+            row.each_mut().map(|plane| &mut plane[columns.clone()]);
+        let squares = &mut squares[columns];
         for i in 0..count {
             let weight = kernel * weights[i];
             let square = weight * weight;
@@ -221,15 +220,16 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
         }
     }
     // The centre always counts, so the total is not zero.
+    let [r, g, b, luminance, variance] = row;
     for x in 0..width {
-        let scale = 1.0 / row.luminance[x];
-        let rgb = row.rgb.each_mut().map(|plane| {
-            plane[x] *= scale;
-            plane[x]
+        let scale = 1.0 / luminance[x];
+        let rgb = [&mut r[x], &mut g[x], &mut b[x]].map(|value| {
+            *value *= scale;
+            *value
         });
         let shared = if step == 1 { 1.0 } else { shared_noise(squares[x] * scale * scale) };
-        row.variance[x] *= scale * scale * shared;
-        row.luminance[x] = compared_luminance(Vec3::from(rgb));
+        variance[x] *= scale * scale * shared;
+        luminance[x] = compared_luminance(Vec3::from(rgb));
     }
 }
 

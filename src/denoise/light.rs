@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::guides::{Guides, falling, pairs, rows};
+use super::guides::{Guides, falling, pairs};
 use super::samples::Samples;
 use crate::color::luminance;
 
@@ -22,13 +22,6 @@ pub(super) struct Light {
     pub(super) rgb: [Vec<f32>; 3],
     pub(super) luminance: Vec<f32>,
     pub(super) variance: Vec<f32>,
-}
-
-/// A row of [`Light`], to be written.
-pub(super) struct Row<'a> {
-    pub(super) rgb: [&'a mut [f32]; 3],
-    pub(super) luminance: &'a mut [f32],
-    pub(super) variance: &'a mut [f32],
 }
 
 impl Light {
@@ -53,14 +46,6 @@ impl Light {
     pub(super) fn black(pixels: usize) -> Self {
         let plane = || vec![0.0; pixels];
         Self { rgb: [plane(), plane(), plane()], luminance: plane(), variance: plane() }
-    }
-
-    /// Its rows, to be written side by side.
-    pub(super) fn rows(&mut self, width: usize) -> Vec<Row<'_>> {
-        let [r, g, b] = self.rgb.each_mut();
-        let all = rows([r, g, b, &mut self.luminance, &mut self.variance], width).into_iter();
-        all.map(|[r, g, b, luminance, variance]| Row { rgb: [r, g, b], luminance, variance })
-            .collect()
     }
 
     /// Multiplies each weight by how well the light fits that of the pixels from `there` on. It is the same for both
