@@ -382,13 +382,6 @@ impl<'a> Corner<'a> {
         &self.scene.materials[self.material as usize]
     }
 
-    fn interpolate<T>(&self, values: &[T]) -> T
-    where
-        T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
-    {
-        self.blend(self.vertices.map(|i| values[i]))
-    }
-
     fn blend<T>(&self, [a, b, c]: [T; 3]) -> T
     where
         T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
@@ -415,7 +408,7 @@ impl<'a> Corner<'a> {
 
     fn uv(&self, set: u8) -> Vec2 {
         let uvs = &self.scene.uvs[usize::from(set)];
-        if uvs.is_empty() { Vec2::ZERO } else { self.interpolate(uvs) }
+        if uvs.is_empty() { Vec2::ZERO } else { self.blend(self.vertices.map(|i| uvs[i])) }
     }
 
     /// The texture's value here, ones without a texture.
@@ -429,7 +422,7 @@ impl<'a> Corner<'a> {
         if self.scene.colors.is_empty() {
             return color;
         }
-        color * self.interpolate(&self.scene.colors)
+        color * self.blend(self.vertices.map(|i| self.scene.colors[i]))
     }
 
     /// Normals of the corners, not of unit length; `None` where the triangle is flat.
