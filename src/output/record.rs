@@ -70,24 +70,19 @@ impl Record<'_> {
 
     /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
     pub fn metadata(&self) -> Vec<(String, String)> {
-        let film = self.film;
-        let mut pairs = vec![
-            ("lightgrid.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-            ("lightgrid.scene".to_owned(), self.scene.to_owned()),
-            ("lightgrid.map".to_owned(), self.map.to_owned()),
-            ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
-            ("lightgrid.device".to_owned(), self.device().to_owned()),
+        let own = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("scene", self.scene.to_owned()),
+            ("map", self.map.to_owned()),
+            ("samples_per_pixel", self.film.min_samples().to_string()),
+            ("device", self.device().to_owned()),
         ];
-        if self.with_times {
-            let seconds = format!("{:.3}", self.seconds());
-            pairs.push(("lightgrid.seconds".to_owned(), seconds));
-        }
+        let seconds = self.with_times.then(|| ("seconds", format!("{:.3}", self.seconds())));
+        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let options = self.options.iter().map(|(key, value)| (*key, text(value)));
+        let pairs = own.into_iter().chain(seconds).chain(options);
         // A prefix keeps clear of the names that OpenEXR reserves.
-        pairs.extend(self.options.iter().map(|(key, value)| {
-            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            (format!("lightgrid.{key}"), text)
-        }));
-        pairs
+        pairs.map(|(key, text)| (format!("lightgrid.{key}"), text)).collect()
     }
 
     /// The figures of `--json`.

@@ -56,13 +56,9 @@ pub(super) fn megabytes(bytes: u64) -> String {
 
 /// A number with its standard error, to this many digits after the point; nothing for `None`.
 pub(super) fn plain_estimate(estimate: Option<Estimate>, digits: usize) -> String {
-    match estimate {
-        None => String::new(),
-        Some(Estimate { mean, standard_error: None }) => format!("{mean:.digits$}"),
-        Some(Estimate { mean, standard_error: Some(s) }) => {
-            format!("{mean:.digits$} ± {s:.digits$}")
-        }
-    }
+    let Some(Estimate { mean, standard_error }) = estimate else { return String::new() };
+    let error = standard_error.map(|error| format!(" ± {error:.digits$}"));
+    format!("{mean:.digits$}{}", error.unwrap_or_default())
 }
 
 impl Display for SpeedUp {
