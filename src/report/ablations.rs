@@ -63,52 +63,35 @@ pub fn groups() -> Vec<&'static str> {
 }
 
 fn variants() -> Vec<Method> {
+    const VISIBLE: DistributionOptions =
+        DistributionOptions { recording: Recording::Visible, ..DistributionOptions::TALK };
+    const COSINE: DistributionOptions =
+        DistributionOptions { recording: Recording::VisibleCosine, ..DistributionOptions::TALK };
+    const WITH_FACES: DistributionOptions = DistributionOptions { faces: true, ..COSINE };
     let mut found = Vec::new();
     let mut add = |group: &'static str, name: &str, change: &dyn Fn(&mut Settings)| {
         let mut settings = Settings::of(Sampling::Adaptive);
         change(&mut settings);
         found.push(Method { name: name.to_owned(), group: Some(group), settings });
     };
-    modes(&mut add);
-    steps(&mut add);
-    distributions(&mut add);
-    sizes(&mut add);
-    samples_and_tables(&mut add);
-    found
-}
-
-type Add<'a> = dyn FnMut(&'static str, &str, &dyn Fn(&mut Settings)) + 'a;
-
-fn modes(add: &mut Add<'_>) {
     let group = "sampling modes";
     add(group, "talk", &|s| s.sampling = Sampling::Talk);
     add(group, "bsdf", &|s| s.sampling = Sampling::Bsdf);
-}
-
-/// Step by step from counted visibility to the full method, one addition each.
-fn steps(add: &mut Add<'_>) {
-    const VISIBLE: DistributionOptions =
-        DistributionOptions { recording: Recording::Visible, ..DistributionOptions::TALK };
-    const COSINE: DistributionOptions =
-        DistributionOptions { recording: Recording::VisibleCosine, ..DistributionOptions::TALK };
+    // Step by step from counted visibility to the full method, one addition each.
     let group = "step by step, neither pooling nor powers";
-    add(group, "talk + faces", &|s| {
-        s.distributions = DistributionOptions { faces: true, ..DistributionOptions::TALK }
-    });
-    add(group, "visibility", &|s| s.distributions = VISIBLE);
-    add(group, "visibility + faces", &|s| {
-        s.distributions = DistributionOptions { faces: true, ..VISIBLE }
-    });
-    add(group, "visibility + cosine", &|s| s.distributions = COSINE);
-    add(group, "visibility + faces + cosine", &|s| {
-        s.distributions = DistributionOptions { faces: true, ..COSINE };
-    });
-    add(group, "visibility + faces + cosine + compensation", &|s| {
-        s.distributions = DistributionOptions { faces: true, compensation: 0.5, ..COSINE };
-    });
-}
-
-fn distributions(add: &mut Add<'_>) {
+    for (name, distributions) in [
+        ("talk + faces", DistributionOptions { faces: true, ..DistributionOptions::TALK }),
+        ("visibility", VISIBLE),
+        ("visibility + faces", DistributionOptions { faces: true, ..VISIBLE }),
+        ("visibility + cosine", COSINE),
+        ("visibility + faces + cosine", WITH_FACES),
+        (
+            "visibility + faces + cosine + compensation",
+            DistributionOptions { compensation: 0.5, ..WITH_FACES },
+        ),
+    ] {
+        add(group, name, &|s| s.distributions = distributions);
+    }
     let group = "faces and cosine";
     add(group, "no faces (nor compensation)", &|s| s.distributions.faces = false);
     add(group, "no cosine", &|s| s.distributions.recording = Recording::Visible);
@@ -138,9 +121,6 @@ fn distributions(add: &mut Add<'_>) {
     ] {
         add(group, name, &|s| s.distributions.rendered_paths = rendered_paths);
     }
-}
-
-fn sizes(add: &mut Add<'_>) {
     let group = "tiles";
     for (columns, rows) in [(8, 4), (32, 16), (64, 32)] {
         add(group, &format!("{columns}x{rows} tiles"), &|s| s.tiles = (columns, rows));
@@ -157,9 +137,6 @@ fn sizes(add: &mut Add<'_>) {
     for tries in [1, 4, 16] {
         add(group, &format!("tries {tries}"), &|s| s.distributions.tries_per_vertex = tries);
     }
-}
-
-fn samples_and_tables(add: &mut Add<'_>) {
     let group = "samples";
     add(group, "independent points instead of Sobol's", &|s| s.points = Points::Independent);
     add(group, "no Russian roulette", &|s| s.russian_roulette = false);
@@ -172,4 +149,5 @@ fn samples_and_tables(add: &mut Add<'_>) {
     for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
         add(group, &format!("table {table}"), &|s| s.table = table);
     }
+    found
 }
