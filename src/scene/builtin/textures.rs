@@ -8,14 +8,19 @@ use crate::noise::{smoothstep, tiling, tiling_fbm, unit};
 use crate::sampler::hash;
 use crate::scene::TextureImage;
 
-/// An image of linear colours `f(u, v)`, stored sRGB-encoded.
-fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureImage {
+/// An image of linear colours that `f` makes of some tones at `(u, v)`, stored sRGB-encoded.
+fn paint<const N: usize>(
+    [width, height]: [u32; 2],
+    tones: [[f32; 3]; N],
+    f: impl Fn(Vec2, [Vec3; N]) -> Vec3 + Sync,
+) -> TextureImage {
     const STEPS: usize = 4096;
     let encode: Vec<u8> = (0..=STEPS)
         .map(|i| (255.0 * srgb_from_linear(i as f32 / STEPS as f32) + 0.5) as u8)
         .collect();
     let byte = |x: f32| encode[(x.clamp(0.0, 1.0) * STEPS as f32) as usize];
-    let texels = texel_by_texel([width, height], |uv, _| f(uv).to_array().map(byte));
+    let tones = tones.map(Vec3::from);
+    let texels = texel_by_texel([width, height], |uv, _| f(uv, tones).to_array().map(byte));
     TextureImage { width, height, texels: texels.into() }
 }
 
@@ -58,8 +63,7 @@ fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
 
 /// Timber for furniture, grain along u.
 pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(512, 384, |uv| grain(uv, tone, TIMBER))
+    paint([512, 384], [tone], |uv, [tone]| grain(uv, tone, TIMBER))
 }
 
 /// A piece of a wooden floor at a place of it.
@@ -125,20 +129,17 @@ impl Board {
 
 /// Floor boards along u: `rows` of them, each of `boards` pieces.
 pub(super) fn planks(tone: [f32; 3], rows: u32, boards: u32) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(1024, 1024, |uv| Board::of_planks(uv, rows, boards).color(tone, 0.35))
+    paint([1024; 2], [tone], |uv, [tone]| Board::of_planks(uv, rows, boards).color(tone, 0.35))
 }
 
 /// Herringbone parquet, 24 widths of a block each way.
 pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(1024, 1024, |uv| Board::of_herringbone(uv).color(tone, 0.45))
+    paint([1024; 2], [tone], |uv, [tone]| Board::of_herringbone(uv).color(tone, 0.45))
 }
 
 /// Wall paint over plaster: nearly even, a little cloudy.
 pub(super) fn plaster(tone: [f32; 3], roughness: f32) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(256, 256, |uv| {
+    paint([256; 2], [tone], |uv, [tone]| {
         let cloud = tiling_fbm(uv * 4.0, IVec2::splat(4), 4, 21) - 0.5;
         let speck = tiling(uv * 120.0, IVec2::splat(120), 22) - 0.5;
         tone * (1.0 + roughness * (0.5 * cloud + 0.16 * speck))
@@ -174,8 +175,7 @@ impl Thread {
 
 /// Plain weave with uneven threads, `threads` across the texture.
 pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(256, 256, |uv| {
+    paint([256; 2], [tone], |uv, [tone]| {
         let thread = Thread::at(uv, threads);
         let slub = tiling_fbm(uv * Vec2::splat(12.0), IVec2::splat(12), 3, 31) - 0.5;
         let shade = 0.16 * (unit(thread.number) - 0.5) + 0.22 * slub;
@@ -185,8 +185,7 @@ pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
 
 /// Running-bond bricks, `columns` x `rows` of them (`rows` even).
 pub(super) fn bricks(tone: [f32; 3], mortar: [f32; 3], columns: u32, rows: u32) -> TextureImage {
-    let (tone, mortar) = (Vec3::from(tone), Vec3::from(mortar));
-    paint(768, 768, |uv| {
+    paint([768; 2], [tone, mortar], |uv, [tone, mortar]| {
         let v = uv.y * rows as f32;
         let row = v as u32;
         let u = (uv.x * columns as f32 + 0.5 * (row & 1) as f32).rem_euclid(columns as f32);
@@ -203,8 +202,7 @@ pub(super) fn bricks(tone: [f32; 3], mortar: [f32; 3], columns: u32, rows: u32) 
 
 /// Square-cut stones in rows of uneven lengths, for paving and ashlar: `rows` of them (even).
 pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(768, 768, |uv| {
+    paint([768; 2], [tone], |uv, [tone]| {
         let v = uv.y * rows as f32;
         let row = v as u32;
         let bend = 0.25
@@ -224,8 +222,7 @@ pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> Tex
 
 /// Woven rug: a field of diamonds in a double border. Covers the rug once.
 pub(super) fn rug(ground: [f32; 3], figure: [f32; 3], accent: [f32; 3]) -> TextureImage {
-    let [ground, figure, accent] = [ground, figure, accent].map(Vec3::from);
-    paint(768, 576, |uv| {
+    paint([768, 576], [ground, figure, accent], |uv, [ground, figure, accent]| {
         // Distances in units of the shorter side.
         let p = Vec2::new(uv.x * 4.0 / 3.0, uv.y);
         let inset = p.x.min(4.0 / 3.0 - p.x).min(p.y).min(1.0 - p.y);
@@ -233,30 +230,17 @@ pub(super) fn rug(ground: [f32; 3], figure: [f32; 3], accent: [f32; 3]) -> Textu
         let diamond = (cell.fract() - 0.5).abs().element_sum();
         let odd = (cell.x as i32 + cell.y as i32) & 1 == 1;
         let along = (p.x + p.y) * 18.0;
-        let mut c = if inset < 0.025 {
-            ground * 0.85
-        } else if inset < 0.04 {
-            figure
-        } else if inset < 0.095 {
-            if (along.fract() - 0.5).abs() * 0.11 > (inset - 0.0675).abs() {
-                accent
-            } else {
-                ground
-            }
-        } else if inset < 0.11 {
-            figure
-        } else if diamond < 0.14 {
-            accent
-        } else if diamond < 0.30 {
-            if odd { ground } else { figure }
-        } else if diamond < 0.36 {
-            figure
-        } else {
-            ground
-        };
+        let is_tooth = (along.fract() - 0.5).abs() * 0.11 > (inset - 0.0675).abs();
+        let teeth = if is_tooth { accent } else { ground };
+        let ring = if odd { ground } else { figure };
+        let border = [(0.025, ground * 0.85), (0.04, figure), (0.095, teeth), (0.11, figure)];
+        let field = [(0.14, accent), (0.30, ring), (0.36, figure)];
+        let band = |bands: &[(f32, Vec3)], at: f32| bands.iter().find(|band| at < band.0).copied();
+        let found = band(&border, inset).or_else(|| band(&field, diamond));
+        let c = found.map_or(ground, |(_, color)| color);
         let tuft = tiling_fbm(uv * 180.0, IVec2::splat(180), 2, 61);
         let wear = tiling_fbm(uv * 5.0, IVec2::splat(5), 4, 62);
-        c = c.lerp(ground, 0.25 * wear);
+        let c = c.lerp(ground, 0.25 * wear);
         c * (0.72 + 0.5 * tuft) * (0.88 + 0.24 * wear)
     })
 }
@@ -286,8 +270,7 @@ pub(super) fn painting(seed: u32) -> TextureImage {
             [0.86, 0.80, 0.68],
         ],
     ];
-    let palette = PALETTES[seed as usize % PALETTES.len()].map(Vec3::from);
-    paint(240, 320, |uv| {
+    paint([240, 320], PALETTES[seed as usize % PALETTES.len()], |uv, palette| {
         let brush = tiling_fbm(uv * Vec2::new(10.0, 60.0), IVec2::new(10, 60), 3, seed + 71) - 0.5;
         let mut c = palette[0].lerp(palette[4], smoothstep(0.0, 0.5, uv.y) + 0.4 * brush);
         let sun = uv.distance(Vec2::new(0.62, 0.27) + 0.006 * brush);
@@ -314,8 +297,7 @@ pub(super) fn painting(seed: u32) -> TextureImage {
 
 /// Stripes along v, `count` pairs, for awnings.
 pub(super) fn stripes(a: [f32; 3], b: [f32; 3], count: u32) -> TextureImage {
-    let [a, b] = [a, b].map(Vec3::from);
-    paint(512, 64, |uv| {
+    paint([512, 64], [a, b], |uv, [a, b]| {
         let weave = tiling(uv * Vec2::new(256.0, 32.0), IVec2::new(256, 32), 81);
         let band = (uv.x * count as f32).fract();
         a.lerp(b, smoothstep(0.48, 0.5, band) - smoothstep(0.98, 1.0, band)) * (0.9 + 0.15 * weave)
