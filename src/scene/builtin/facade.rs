@@ -83,17 +83,13 @@ fn front(
     let bay = width / bays as f32;
     let storey = (height - GROUND - 0.4) / floors as f32;
     let (w, h) = ((0.42 * bay).min(1.15), (0.60 * storey).min(1.9));
-    let mut windows = Vec::new();
+    let (mut windows, mut openings) = (Vec::new(), Vec::new());
     for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
         for j in 0..floors {
             let sill = GROUND + storey * j as f32 + 0.24 * storey;
             windows.push([middle - 0.5 * w, sill, middle + 0.5 * w, sill + h]);
         }
-    }
-    let mut openings = Vec::new();
-    for i in 0..bays {
-        let middle = bay * (i as f32 + 0.5);
         let half = if shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
         let is_door = i % 3 == 1;
         let sill = if is_door {

@@ -148,33 +148,31 @@ fn window(b: &mut Builder, m: &Palette) {
         fittings::curtain(b, m.curtain, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
         fittings::curtain(b, m.curtain, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
         fittings::curtain_rod(b, m.brass, [u0 - 0.55, u1 + 0.55], 2.50, 0.13);
-        for (u, kind) in [(1.62, 0), (2.72, 1), (3.36, 2)] {
-            b.standing(Vec3::new(u, v0 + 0.016, -0.03), 0.0, |b| match kind {
-                0 => {
-                    let soil = plants::pot(b, m.ceramic, m.soil, 0.065, 0.11);
-                    b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 9, 0.26, 4));
-                }
-                1 => objects::vase(b, m.ceramic, 0.19, &[0.20, 0.33, 0.30, 0.13, 0.17]),
-                _ => {
-                    let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.12);
-                    b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 9, 0.22, 9));
-                }
-            });
-        }
+        let on_board = |u: f32| Vec3::new(u, v0 + 0.016, -0.03);
+        b.standing(on_board(1.62), 0.0, |b| {
+            let soil = plants::pot(b, m.ceramic, m.soil, 0.065, 0.11);
+            b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 9, 0.26, 4));
+        });
+        b.standing(on_board(2.72), 0.0, |b| {
+            objects::vase(b, m.ceramic, 0.19, &[0.20, 0.33, 0.30, 0.13, 0.17]);
+        });
+        b.standing(on_board(3.36), 0.0, |b| {
+            let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.12);
+            b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 9, 0.22, 9));
+        });
     });
 }
 
 fn pictures(b: &mut Builder, m: &Palette) {
     let wall = room::walls(SIZE)[2];
     b.part(wall.frame(), |b| {
-        for (k, [u, v, w, h]) in
-            [[1.80, 1.32, 0.72, 0.94], [3.22, 1.62, 0.46, 0.60], [3.76, 1.36, 0.40, 0.52]]
-                .into_iter()
-                .enumerate()
-        {
-            let frame = if k == 0 { m.brass } else { m.walnut };
+        for (frame, art, [u, v, w, h]) in [
+            (m.brass, m.arts[0], [1.80, 1.32, 0.72, 0.94]),
+            (m.walnut, m.arts[1], [3.22, 1.62, 0.46, 0.60]),
+            (m.walnut, m.arts[2], [3.76, 1.36, 0.40, 0.52]),
+        ] {
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                objects::picture(b, [frame, m.white, m.arts[k]], [w, h], 0.07);
+                objects::picture(b, [frame, m.white, art], [w, h], 0.07);
             });
         }
     });
@@ -184,15 +182,11 @@ fn seating(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| furniture::rug(b, m.rug, m.linen, [2.9, 2.0]));
     b.standing(Vec3::new(-0.45, 0.0, -1.92), 0.0, |b| {
         seating::sofa(b, m.velvet, m.walnut, 2.35, 3);
-        for (k, (x, turn, tone)) in [
-            (-0.82, -18.0, [0.95, 0.93, 0.88]),
-            (-0.52, 8.0, [0.20, 0.30, 0.30]),
-            (0.80, 20.0, [0.95, 0.72, 0.30]),
-        ]
-        .into_iter()
-        .enumerate()
-        {
-            let z = if k == 1 { 0.06 } else { -0.02 };
+        for (x, z, turn, tone) in [
+            (-0.82, -0.02, -18.0, [0.95, 0.93, 0.88]),
+            (-0.52, 0.06, 8.0, [0.20, 0.30, 0.30]),
+            (0.80, -0.02, 20.0, [0.95, 0.72, 0.30]),
+        ] {
             b.part(placed([x, 0.685, z], [68.0, turn, 0.0]), |b| {
                 b.tinted(tone, |b| seating::pillow(b, m.cotton, 0.23));
             });

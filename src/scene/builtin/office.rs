@@ -126,11 +126,10 @@ fn shell(b: &mut Builder, m: &Palette) {
 fn wall_things(b: &mut Builder, m: &Palette) {
     let wall = room::walls(SIZE)[2];
     b.part(wall.frame(), |b| {
-        for (k, [u, v, w, h]) in
-            [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]].into_iter().enumerate()
-        {
+        let places = [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]];
+        for (art, [u, v, w, h]) in m.arts.into_iter().zip(places) {
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                objects::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06);
+                objects::picture(b, [m.oak, m.white, art], [w, h], 0.06);
             });
         }
         b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
