@@ -53,17 +53,14 @@ impl Instance {
     /// inverse, and does not stretch one direction thousands of times more than another.
     pub fn can_be_walked(world_from_mesh: DAffine3) -> bool {
         let inverse = world_from_mesh.inverse();
-        let (size, inverse_size) = (norm(world_from_mesh), norm(inverse));
+        let [size, inverse_size] =
+            [world_from_mesh, inverse].map(|map| row_sums(map).max_element());
         world_from_mesh.is_finite()
             && inverse.is_finite()
             && size <= MAX_SCALE
             && inverse_size <= MAX_SCALE
             && size * inverse_size <= MAX_CONDITION
     }
-}
-
-fn norm(map: DAffine3) -> f64 {
-    row_sums(map).max_element()
 }
 
 /// Sums of the absolute values in each row of a map's matrix: how far each coordinate moves at most as
