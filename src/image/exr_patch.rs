@@ -14,7 +14,8 @@ pub(super) struct Patched {
 /// pixel. `None` if the header makes no sense.
 pub(super) fn patch(mut bytes: Vec<u8>) -> Option<Patched> {
     let mut sampling = None;
-    for list in channel_lists(&bytes)? {
+    let attributes = attributes(&bytes)?.into_iter().flatten();
+    for Attribute { value: list, .. } in attributes.filter(|it| it.is_channel_list) {
         let mut channels = Vec::new();
         let mut rest = &bytes[list.clone()];
         while rest.first().is_some_and(|&byte| byte != 0) {
@@ -51,12 +52,6 @@ pub(super) fn sort_attributes(start: &mut [u8]) -> Option<()> {
     let sorted = sorted.concat();
     start[first..last].copy_from_slice(&sorted);
     Some(())
-}
-
-/// Where the lists of channels of all parts are.
-fn channel_lists(bytes: &[u8]) -> Option<Vec<Range<usize>>> {
-    let all = attributes(bytes)?.into_iter().flatten();
-    Some(all.filter(|it| it.is_channel_list).map(|it| it.value).collect())
 }
 
 /// Where an attribute of a header is.

@@ -10,7 +10,7 @@ use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::MetaData;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, ChannelList, IntegerBounds, SampleType,
+    AttributeValue, ChannelDescription, ChannelList, EnvironmentMap, IntegerBounds, SampleType,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
@@ -162,7 +162,8 @@ fn decode<R: Read + Seek>(
     if block_decoder.sampling.is_some() {
         block_decoder.hold(&mut image);
     }
-    Ok(FilePicture { image, notices, is_linear: true, is_cube_map: is_cube_map(&header) })
+    let is_cube_map = header.own_attributes.environment_map == Some(EnvironmentMap::Cube);
+    Ok(FilePicture { image, notices, is_linear: true, is_cube_map })
 }
 
 /// A chromaticity `xy`.
@@ -505,12 +506,6 @@ fn planes_of_b44(
 fn rgb_from_ycc([y, ry, by]: [f32; 3], weights: Vec3) -> [f32; 3] {
     let (r, b) = ((ry + 1.0) * y, (by + 1.0) * y);
     [r, (y - weights.x * r - weights.z * b) / weights.y, b]
-}
-
-/// Whether the `envmap` attribute says cube.
-fn is_cube_map(header: &Header) -> bool {
-    use exr::meta::attribute::EnvironmentMap;
-    header.own_attributes.environment_map == Some(EnvironmentMap::Cube)
 }
 
 /// A decoder's error in the words of someone who wanted a picture.
