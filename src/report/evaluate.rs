@@ -125,12 +125,8 @@ impl Context<'_> {
     pub(super) fn reference_report(&self, state: &RowState) -> Result<Option<ReferenceReport>> {
         let error = smallest_error(state);
         let noise = match &state.reference {
-            Some(reference) => {
-                if reference.facts.pictures < MIN_PICTURES {
-                    return Ok(None);
-                }
-                Some(reference.noise())
-            }
+            Some(reference) if reference.facts.pictures < MIN_PICTURES => return Ok(None),
+            Some(reference) => Some(reference.noise()),
             None => self.noise_of_file(state)?,
         };
         let share = noise.zip(error).map(|(noise, error)| noise.trimmed_rel_mse / error);

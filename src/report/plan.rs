@@ -175,11 +175,7 @@ impl Row {
 
     /// Speed-up in the talk on a device.
     pub(super) fn published_on(&self, device: Device) -> Option<f64> {
-        let [cpu, gpu] = self.published?;
-        Some(match device {
-            Device::Cpu => cpu,
-            Device::Gpu => gpu,
-        })
+        self.published.map(|of_devices| of_devices[device as usize])
     }
 }
 

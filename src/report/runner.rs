@@ -150,13 +150,17 @@ impl Runner<'_> {
         }
         self.say_run(state, device, method, seed);
         let settings = &plan.methods[method].settings;
-        if !self.make_ready(state, device, method) {
-            return Ok(true);
+        let on = &self.context.devices[device];
+        if on.gpu.is_some() {
+            // Kernels are compiled, unless they are cached; a GPU may not support them.
+            let ready = self.context.place(state, device, settings).warm_up(settings);
+            if !self.accept(state, device, &ready) {
+                return Ok(true);
+            }
         }
         let (place, seconds) = (self.context.place(state, device, settings), plan.effort.seconds);
         let measured = place.measure(&plan.methods[method], seed, seconds)?;
         let Some(mut done) = measured else { return Ok(false) };
-        let on = &self.context.devices[device];
         if seed == 0 && on.gpu.is_none() {
             let (grid, seconds) = (done.grid.take(), seconds.min(1.0));
             done.run.nanoseconds_per_ray = state.prepared.time_rays(on, settings, grid, seconds)?;
@@ -175,16 +179,6 @@ impl Runner<'_> {
             self.write_pages()?;
         }
         Ok(!self.context.is_cancelled())
-    }
-
-    /// Compiles a GPU's kernels for a method, unless they are cached; `false` if the GPU does not support it.
-    fn make_ready(&self, state: &mut RowState, device: usize, method: usize) -> bool {
-        if self.context.devices[device].gpu.is_none() {
-            return true;
-        }
-        let settings = &self.context.plan.methods[method].settings;
-        let ready = self.context.place(state, device, settings).warm_up(settings);
-        self.accept(state, device, &ready)
     }
 
     /// Whether `outcome` is a success; else stores the reason why the device cannot render the row.

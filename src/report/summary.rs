@@ -368,8 +368,7 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
 }
 
 fn estimate(runs: &[Run], value: impl Fn(&Run) -> Option<f64>) -> Option<Estimate> {
-    let values: Vec<f64> = runs.iter().filter_map(value).collect();
-    (!values.is_empty()).then(|| Estimate::of(&values)).flatten()
+    Estimate::of(&runs.iter().filter_map(value).collect::<Vec<_>>())
 }
 
 /// A slope is fitted to the points from this share of the rendering time and this many samples on, where the

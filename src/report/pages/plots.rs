@@ -13,13 +13,8 @@ const INKS: [&str; 9] = [
 
 /// The ink of the method of this name and index in its plan.
 fn ink(name: &str, index: usize) -> &'static str {
-    match name {
-        "plain" => INKS[0],
-        "talk" => INKS[1],
-        "adaptive" => INKS[2],
-        "bsdf" => INKS[3],
-        _ => INKS[4 + index % 5],
-    }
+    let own = ["plain", "talk", "adaptive", "bsdf"].iter().position(|own| *own == name);
+    INKS[own.unwrap_or(4 + index % 5)]
 }
 
 /// A coordinate to a tenth of a pixel, so that it has one digit after the point as text.
