@@ -57,7 +57,8 @@ impl Wanted {
         srgb: bool,
     ) -> Fallible<u32> {
         let texture = document.textures.get(index)?;
-        let sampler = texture.sampler.map(|sampler| document.samplers.get(sampler)).transpose()?;
+        let sampler = texture.sampler.map(|sampler| document.samplers.get(sampler));
+        let sampler = sampler.transpose()?.unwrap_or_default();
         let plain = u32::try_from(texture.source.value()).unwrap_or(NO_IMAGE);
         let image = image_of(&texture).unwrap_or(plain);
         if image != plain && plain != NO_IMAGE {
@@ -65,10 +66,9 @@ impl Wanted {
         }
         let wanted = Texture {
             image,
-            wrap_u: sampler.as_ref().map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_s)),
-            wrap_v: sampler.as_ref().map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_t)),
-            nearest: sampler.and_then(|sampler| sampler.mag_filter)
-                == Some(Checked::Valid(MagFilter::Nearest)),
+            wrap_u: wrap(sampler.wrap_s),
+            wrap_v: wrap(sampler.wrap_t),
+            nearest: sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)),
             srgb,
         };
         Ok(*self.places.entry(wanted).or_insert_with(|| {
@@ -89,31 +89,25 @@ impl Wanted {
         shelf.read(file, &mut instead);
         let Shelf { images, places, premultiplied, .. } = shelf;
 
-        let mut image_map = BTreeMap::new();
+        let read = |number: &u32| places.get(number)?.as_ref().ok();
+        let other = |number: &u32| self.fallbacks.get(number).filter(|other| read(other).is_some());
+        let name = |number: u32| image_name(&file.document, number);
         let mut failures = Vec::new();
         for number in numbers {
-            let name = image_name(&file.document, number);
-            let fallback = self.fallbacks.get(&number);
-            let other =
-                fallback.and_then(|other| Some((*other, *places.get(other)?.as_ref().ok()?)));
-            match (&places[&number], other) {
-                (Ok(place), _) => {
-                    image_map.insert(number, *place);
-                    if premultiplied.contains(place) {
-                        notices.add(format!(
-                            "{name} has colours multiplied by their opacity, which glTF does not know; \
-                             they are used as they are"
-                        ));
-                    }
+            match &places[&number] {
+                Ok(place) if premultiplied.contains(place) => notices.add(format!(
+                    "{} has colours multiplied by their opacity, which glTF does not know; \
+                     they are used as they are",
+                    name(number)
+                )),
+                Ok(_) => {}
+                Err(cause) => {
+                    let instead = match other(&number) {
+                        Some(other) => format!("{} is used instead", name(*other)),
+                        None => "materials do without it".to_owned(),
+                    };
+                    failures.push(format!("{} cannot be used: {cause}; {instead}", name(number)));
                 }
-                (Err(cause), Some((other, place))) => {
-                    image_map.insert(number, place);
-                    let other = image_name(&file.document, other);
-                    failures
-                        .push(format!("{name} cannot be used: {cause}; {other} is used instead"));
-                }
-                (Err(cause), None) => failures
-                    .push(format!("{name} cannot be used: {cause}; materials do without it")),
             }
         }
         let unnamed = failures.len().saturating_sub(MAX_FAILURES);
@@ -123,7 +117,7 @@ impl Wanted {
         }
         let mut textures = Vec::new();
         let place = |texture: &Texture| {
-            let image = *image_map.get(&texture.image)?;
+            let image = *read(&texture.image).or_else(|| read(other(&texture.image)?))?;
             textures.push(Texture { image, ..*texture });
             Some(textures.len() as u32 - 1)
         };
@@ -191,8 +185,10 @@ impl Shelf {
         distinct.dedup();
         let mut encoded: Vec<_> = distinct.iter().map(|source| source.read(file)).collect();
         within_limit(&mut encoded, &mut self.texels);
-        let decoded: Vec<Fallible<LdrImage>> =
-            encoded.into_par_iter().map(|bytes| decode(&bytes?)).collect();
+        let decode = |bytes: Fallible<Cow<'_, [u8]>>| {
+            decode_ldr(&bytes?, "its data").map_err(|cause| cause.to_string())
+        };
+        let decoded: Vec<Fallible<LdrImage>> = encoded.into_par_iter().map(decode).collect();
         let places: Vec<Fallible<u32>> = decoded
             .into_iter()
             .map(|result| {
@@ -308,8 +304,4 @@ fn within_limit(images: &mut [Fallible<Cow<'_, [u8]>>], texels: &mut u64) {
             *image = Err(cause);
         }
     }
-}
-
-fn decode(bytes: &[u8]) -> Fallible<LdrImage> {
-    decode_ldr(bytes, "its data").map_err(|cause| cause.to_string())
 }
