@@ -68,26 +68,19 @@ fn camera(
     world_from_camera: DAffine3,
     notices: &mut Notices,
 ) -> Camera {
-    let mut usable = world_from_camera.is_finite();
-    let projection = match (&source.perspective, &source.orthographic) {
-        (Some(perspective), _) => {
-            let fits = perspective.yfov > 0.0 && perspective.yfov < PI;
-            usable &= fits;
-            let fov_y_radians = if fits { perspective.yfov } else { DEFAULT_FOV_Y_RADIANS };
-            Projection::Perspective { fov_y_radians }
-        }
+    let (usable, projection) = match (&source.perspective, &source.orthographic) {
         (None, Some(parallel)) => {
-            let y = parallel.ymag.abs();
-            let fits = y > 0.0 && y.is_finite();
-            usable &= fits;
-            Projection::Orthographic { half_height: if fits { y } else { 1.0 } }
+            let height = Some(parallel.ymag.abs()).filter(|y| *y > 0.0 && y.is_finite());
+            (height, Projection::Orthographic { half_height: height.unwrap_or(1.0) })
         }
-        (None, None) => {
-            usable = false;
-            Projection::Perspective { fov_y_radians: DEFAULT_FOV_Y_RADIANS }
+        (perspective, _) => {
+            let fov = perspective.as_ref().map(|it| it.yfov);
+            let fov = fov.filter(|fov| *fov > 0.0 && *fov < PI);
+            let fov_y_radians = fov.unwrap_or(DEFAULT_FOV_Y_RADIANS);
+            (fov, Projection::Perspective { fov_y_radians })
         }
     };
-    if !usable {
+    if usable.is_none() || !world_from_camera.is_finite() {
         notices.add(format!("camera {name} is damaged; the unusable values are replaced"));
     }
     let world_from_camera =
