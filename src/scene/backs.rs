@@ -115,18 +115,15 @@ impl Faces<'_> {
         if self.normal(face.start).dot(self.normal(triangle)) < MIN_COSINE {
             return false;
         }
-        let known = || face.clone().flat_map(|at| self.positions(at));
+        let known = || face.clone().flat_map(|at| self.scene.corners_at((at, None)));
         let is_known = |at: &Vec3| known().any(|corner| corner == *at);
-        self.positions(triangle).into_iter().filter(is_known).count() >= 2
-    }
-
-    fn positions(&self, triangle: usize) -> [Vec3; 3] {
-        self.scene.triangles[triangle].map(|corner| self.scene.positions[corner as usize])
+        self.scene.corners_at((triangle, None)).into_iter().filter(is_known).count() >= 2
     }
 
     /// Where the corners of a face are, each once, in order.
     fn corners(&self, face: Range<usize>) -> Vec<[u32; 3]> {
-        let mut corners: Vec<_> = face.flat_map(|at| self.positions(at).map(bits)).collect();
+        let mut corners: Vec<_> =
+            face.flat_map(|at| self.scene.corners_at((at, None)).map(bits)).collect();
         corners.sort_unstable();
         corners.dedup();
         corners
@@ -135,7 +132,7 @@ impl Faces<'_> {
     /// Twice the area as a vector.
     fn area(&self, face: Range<usize>) -> Vec3 {
         let area = |at: usize| {
-            let [a, b, c] = self.positions(at);
+            let [a, b, c] = self.scene.corners_at((at, None));
             (b - a).cross(c - a)
         };
         face.map(area).sum()

@@ -279,10 +279,6 @@ impl Scene {
 
     /// A vertex like another, elsewhere.
     fn add_moved(&mut self, vertex: u32, by: DVec3) -> u32 {
-        fn again<T: Copy>(values: &mut Vec<T>, vertex: usize) {
-            let value = values.get(vertex).copied();
-            values.extend(value);
-        }
         let from = vertex as usize;
         again(&mut self.normals, from);
         again(&mut self.tangents, from);
@@ -291,6 +287,12 @@ impl Scene {
         self.positions.push((self.positions[from].as_dvec3() + by).as_vec3());
         self.positions.len() as u32 - 1
     }
+}
+
+/// Appends the value of a vertex, if vertices have values.
+pub(super) fn again<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+    let value = values.get(vertex).copied();
+    values.extend(value);
 }
 
 /// How far [`offset_origin`] moves points along a normal, given how far they are from zero along each axis at most.

@@ -13,18 +13,14 @@ const MAX_DISTANCE: f64 = 16.0;
 /// Extent that others are scaled to, within a factor of 2.
 const EXTENT: f64 = 10.0;
 
-/// Scene coordinates are those of the file less `center`, times `scale`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Of the scene in its file, metres.
-    pub center: DVec3,
-    /// Above 0; a power of 2, so that it rounds nothing.
-    pub scale: f64,
-}
-
-impl Default for Frame {
-    fn default() -> Self {
-        Self { center: DVec3::ZERO, scale: 1.0 }
+with_defaults! {
+    /// Scene coordinates are those of the file less `center`, times `scale`.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Frame {
+        /// Of the scene in its file, metres.
+        pub center: DVec3 = DVec3::ZERO,
+        /// Above 0; a power of 2, so that it rounds nothing.
+        pub scale: f64 = 1.0,
     }
 }
 

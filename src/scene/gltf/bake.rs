@@ -93,12 +93,10 @@ fn append(
         let placing = placing(vertex);
         let position = &mut scene.positions[first + vertex];
         *position = placing.position(*position);
-        if !part.normals.is_empty() {
-            let normal = &mut scene.normals[first + vertex];
+        if let Some(normal) = scene.normals.get_mut(first + vertex) {
             *normal = placing.normal(*normal);
         }
-        if !part.tangents.is_empty() {
-            let tangent = &mut scene.tangents[first + vertex];
+        if let Some(tangent) = scene.tangents.get_mut(first + vertex) {
             *tangent = placing.tangent(*tangent);
         }
     }

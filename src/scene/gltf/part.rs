@@ -2,6 +2,8 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
+use crate::scene::flush::again;
+
 /// The triangles of one primitive with the vertices they use. Arrays of vertex data are empty
 /// where the primitive does not have it, else as long as `positions`.
 #[derive(Default)]
@@ -31,18 +33,12 @@ impl Part {
 
     /// Appends a copy of a vertex and returns its number.
     pub(super) fn copy_vertex(&mut self, vertex: u32) -> u32 {
-        fn copy<T: Copy>(values: &mut Vec<T>, index: usize) {
-            if let Some(&value) = values.get(index) {
-                values.push(value);
-            }
-        }
         let copied = self.positions.len() as u32;
         let vertex = vertex as usize;
-        copy(&mut self.positions, vertex);
-        copy(&mut self.normals, vertex);
-        copy(&mut self.uvs[0], vertex);
-        copy(&mut self.uvs[1], vertex);
-        copy(&mut self.colors, vertex);
+        again(&mut self.positions, vertex);
+        again(&mut self.normals, vertex);
+        self.uvs.iter_mut().for_each(|uvs| again(uvs, vertex));
+        again(&mut self.colors, vertex);
         let stride = self.influences_per_vertex;
         self.influences.extend_from_within(vertex * stride..(vertex + 1) * stride);
         copied
