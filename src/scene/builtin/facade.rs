@@ -90,16 +90,12 @@ fn front(
             let sill = GROUND + storey * j as f32 + 0.24 * storey;
             windows.push([middle - 0.5 * w, sill, middle + 0.5 * w, sill + h]);
         }
-        let half = if shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
         let is_door = i % 3 == 1;
-        let sill = if is_door {
-            0.02
-        } else if shops {
-            0.55
-        } else {
-            1.0
+        let (half, sill) = match (is_door, shops) {
+            (true, _) => (0.55, 0.02),
+            (false, true) => ((0.36 * bay).min(1.3), 0.55),
+            (false, false) => (0.5 * w, 1.0),
         };
-        let half = if is_door { 0.55 } else { half };
         openings.push(([middle - half, sill, middle + half, 0.80 * GROUND], is_door));
     }
     let holes: Vec<Hole> =

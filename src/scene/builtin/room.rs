@@ -133,17 +133,15 @@ pub(super) fn pierced(b: &mut Builder, mat: Mat, span: [f32; 4], thickness: f32,
             face(b, mat, at, du, dv);
             face(b, mat, at + depth, dv, du);
             let (left, below) = (i.checked_sub(1), j.checked_sub(1));
-            if open(left, Some(j)) {
-                b.quad(mat, at, dv, depth);
-            }
-            if open(Some(i + 1), Some(j)) {
-                b.quad(mat, at + du, depth, dv);
-            }
-            if open(Some(i), below) {
-                b.quad(mat, at, depth, du);
-            }
-            if open(Some(i), Some(j + 1)) {
-                b.quad(mat, at + dv, du, depth);
+            for (i, j, at, along, across) in [
+                (left, Some(j), at, dv, depth),
+                (Some(i + 1), Some(j), at + du, depth, dv),
+                (Some(i), below, at, depth, du),
+                (Some(i), Some(j + 1), at + dv, du, depth),
+            ] {
+                if open(i, j) {
+                    b.quad(mat, at, along, across);
+                }
             }
         }
     }
