@@ -84,9 +84,8 @@ impl<'a> Elements<'a> {
     }
 
     /// Reads integers as fractions of their largest value even if the file forgets to say so.
-    pub(super) fn with_fractions(mut self) -> Self {
-        self.normalized = true;
-        self
+    pub(super) fn with_fractions(self) -> Self {
+        Self { normalized: true, ..self }
     }
 
     /// Whether components are unsigned integers.

@@ -136,9 +136,8 @@ impl From<&json::texture::Info> for Info {
 
 impl From<&json::material::NormalTexture> for Info {
     fn from(info: &json::material::NormalTexture) -> Self {
-        let transform = info.extensions.as_ref();
-        let transform = transform.and_then(|all| all.others.get("KHR_texture_transform"));
-        let transform = transform.and_then(parsed);
+        let extensions = info.extensions.as_ref();
+        let transform = extensions.and_then(|all| parsed(all.others.get("KHR_texture_transform")?));
         Self { index: info.index, tex_coord: info.tex_coord, transform }
     }
 }

@@ -262,11 +262,7 @@ impl Reading<'_> {
             let weights = weights.unwrap_or_default();
             let parts = match read.take() {
                 Some((known, parts)) if known == weights => parts,
-                _ => {
-                    let mut parts = self.read_parts(mesh, weights)?;
-                    self.open_sheets(&mut parts, placement.instances.first())?;
-                    parts
-                }
+                _ => self.read_parts(mesh, weights, placement.instances.first())?,
             };
             let joints = match placement.skin {
                 Some(skin) => {
@@ -307,7 +303,12 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn read_parts(&mut self, mesh: &Mesh, weights: &[f32]) -> Fallible<Vec<Part>> {
+    fn read_parts(
+        &mut self,
+        mesh: &Mesh,
+        weights: &[f32],
+        place: Option<&DAffine3>,
+    ) -> Fallible<Vec<Part>> {
         let mut parts = Vec::new();
         let (mut triangles, mut bytes) = (0, 0);
         for (number, primitive) in mesh.primitives().enumerate() {
@@ -326,6 +327,7 @@ impl Reading<'_> {
             bytes += part.bytes();
             parts.push(part);
         }
+        self.open_sheets(&mut parts, place)?;
         Ok(parts)
     }
 

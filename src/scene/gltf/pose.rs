@@ -249,18 +249,18 @@ fn scene_roots(
     notices: &mut Notices,
 ) -> Fallible<Option<Vec<Index<json::Node>>>> {
     let scenes = &document.scenes;
-    let (None, 0) = (document.scene, scenes.len()) else {
-        let shown = document.scene.unwrap_or(Index::new(0));
-        let scene: Tops = scenes.get_as(shown)?;
-        if scenes.len() > 1 {
-            notices.add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
-        }
-        for &node in &scene.nodes {
-            document.nodes.text(node)?;
-        }
-        return Ok(Some(scene.nodes));
-    };
-    Ok(None)
+    if document.scene.is_none() && scenes.len() == 0 {
+        return Ok(None);
+    }
+    let shown = document.scene.unwrap_or(Index::new(0));
+    let scene: Tops = scenes.get_as(shown)?;
+    if scenes.len() > 1 {
+        notices.add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
+    }
+    for &node in &scene.nodes {
+        document.nodes.text(node)?;
+    }
+    Ok(Some(scene.nodes))
 }
 
 /// Parent from node, at rest.
@@ -292,13 +292,10 @@ pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<V
     let Some(extension) = extension else { return Ok(None) };
     let nonsense = || "its instances make no sense".to_owned();
     let attributes = extension.get("attributes").and_then(Value::as_object).ok_or_else(nonsense)?;
-    let open = |name: &str, kind| match attributes.get(name) {
-        None => Ok(None),
-        Some(index) => {
-            let index = whole(index).ok_or_else(nonsense)?;
-            let index = Index::new(u32::try_from(index).unwrap_or(u32::MAX));
-            Elements::open(file, index, &[kind]).map(Some)
-        }
+    let open = |name: &str, kind| {
+        let index = attributes.get(name).map(|index| whole(index).ok_or_else(nonsense));
+        let index = index.transpose()?.map(|index| u32::try_from(index).unwrap_or(u32::MAX));
+        index.map(|index| Elements::open(file, Index::new(index), &[kind])).transpose()
     };
     let translation = open("TRANSLATION", Type::Vec3)?;
     let rotation = open("ROTATION", Type::Vec4)?;
