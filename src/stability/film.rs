@@ -1,12 +1,10 @@
 //! The film: many samples, and large samples beside small ones.
 
-use std::sync::atomic::AtomicBool;
-
 use glam::Vec3;
 
 use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
-use super::scenes::{constant, learned, view};
+use super::scenes::{constant, render, view};
 use crate::error::Result;
 use crate::path::{PathResult, WorldBuilder};
 use crate::render::film::Pixel;
@@ -80,16 +78,14 @@ fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
     let (world, environment) = (WorldBuilder::default().build(), constant(radiance)?);
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);
     let view = View { width: 1, height: 1, ..view(camera, Sampling::Plain, 1) };
-    let mut session = learned(setting, (&world, &environment), view)?;
-    session.advance(samples, &AtomicBool::new(false))?;
-    let film = session.film();
+    let film = render(setting, (&world, &environment), view, samples)?;
     let found = film.pixels()[0].mean()[0];
     let off = (found / f64::from(radiance) - 1.0).abs();
     // The map is interpolated in f32, which rounds once; a GPU keeps radiance to 2^-18 of itself,
     // and adds up to 64 samples in f32.
     let limit = if setting.gpu.is_some() { 2e-5 } else { 2e-7 };
     Ok(Outcome::default()
-        .sound(film)
+        .sound(&film)
         .at_least("samples", f64::from(film.min_samples()), f64::from(samples))
         .at_most(format!("mean of {samples} samples, relative"), off, limit))
 }
