@@ -17,7 +17,6 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::counters::{Counters, MAX_RECORDS_PER_PASS, MAX_WEIGHT, Tally, WEIGHT_ONE};
 use crate::light_grid::{LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::path::{Lit, World, WorldBuilder};
-use crate::render::film::Film;
 use crate::render::{Sampling, View};
 use crate::sampler::SplitMix;
 use crate::scene::Camera;
@@ -288,7 +287,7 @@ fn learning_paths(setting: &Setting, paths: u64) -> Result<Outcome> {
     let mut session = learned(setting, (&world, &environment), view.clone())?;
     session.advance(64, &AtomicBool::new(false))?;
     let plain = View { sampling: Sampling::Plain, seed: 4, ..view };
-    let plain: Film = render(setting, (&world, &environment), plain, 256)?;
+    let plain = render(setting, (&world, &environment), plain, 256)?;
     let figures = session.figures();
     let budget = MEMORY_BUDGET_BYTES as f64;
     Ok(Outcome::default()
