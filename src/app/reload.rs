@@ -4,14 +4,14 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, SystemTime};
 
 use super::loader::Kind;
-use super::threads::{Latest, LatestThread, Wake};
+use super::threads::{Wake, spawn};
 use crate::error::Result;
 
 /// Time between two looks. Files that are the same at both are written to their end.
@@ -20,21 +20,17 @@ const PERIOD: Duration = Duration::from_millis(500);
 /// Length and time of the last change; `None` of a file that is not there.
 type Stamp = Option<(u64, SystemTime)>;
 
-/// Files of the scene or of the map.
-#[derive(Clone, Default)]
-struct Watched {
-    /// Empty if it is built in.
-    own: String,
-    others: Arc<[PathBuf]>,
-    /// How often they were read.
-    reads: u32,
-}
+/// What the thread is told of the scene or the map: the files that are looked at from now on, or `None` if those that
+/// are looked at were read.
+type News = (Kind, Option<Vec<PathBuf>>);
 
 /// Looks at files, and says whose have changed.
 pub(super) struct Reload {
-    thread: LatestThread<[Watched; 2]>,
+    /// The thread ends with it.
+    news: Sender<News>,
     changed: Arc<[AtomicBool; 2]>,
-    watched: [Watched; 2],
+    /// The file of the scene and of the map, empty if it is built in, and those that it names.
+    watched: [(String, Arc<[PathBuf]>); 2],
 }
 
 impl Reload {
@@ -44,28 +40,26 @@ impl Reload {
     /// If the system gives no thread.
     pub(super) fn start(wake: Wake) -> Result<Self> {
         let changed = Arc::<[AtomicBool; 2]>::default();
+        let (sender, news) = channel();
         let flags = Arc::clone(&changed);
-        let thread = LatestThread::start("reload", Arc::default(), move |latest| {
-            watch(latest, &flags, &wake);
-        })?;
-        Ok(Self { thread, changed, watched: Default::default() })
+        spawn("reload", move || watch(&news, &flags, &wake))?;
+        Ok(Self { news: sender, changed, watched: Default::default() })
     }
 
     /// Looks at this file and at those that it names from now on.
     pub(super) fn watch(&mut self, kind: Kind, own: &str, others: &Arc<[PathBuf]>) {
         let watched = &mut self.watched[kind as usize];
-        if (&*watched.own, &watched.others) != (own, others) {
-            own.clone_into(&mut watched.own);
-            watched.others = Arc::clone(others);
-            self.send();
+        if (&*watched.0, &watched.1) != (own, others) {
+            *watched = (own.to_owned(), Arc::clone(others));
+            let own = (!own.is_empty()).then(|| PathBuf::from(own));
+            self.tell(kind, Some(own.into_iter().chain(others.iter().cloned()).collect()));
         }
     }
 
     /// Takes note that they are read now.
     pub(super) fn forget(&mut self, kind: Kind) {
-        self.watched[kind as usize].reads += 1;
         self.changed[kind as usize].store(false, Ordering::Relaxed);
-        self.send();
+        self.tell(kind, None);
     }
 
     /// Whether they have changed since this was asked last.
@@ -73,8 +67,9 @@ impl Reload {
         self.changed[kind as usize].swap(false, Ordering::Relaxed)
     }
 
-    fn send(&self) {
-        self.thread.latest.change(|slot| slot.value = Some(self.watched.clone()));
+    fn tell(&self, kind: Kind, files: Option<Vec<PathBuf>>) {
+        // The thread ends after this does.
+        let _ = self.news.send((kind, files));
     }
 }
 
@@ -82,26 +77,22 @@ impl Reload {
 #[derive(Default)]
 struct Known {
     files: BTreeMap<PathBuf, Stamp>,
-    reads: u32,
     /// As they were at the last look, if that was another state than the one that was read.
     settling: Option<Vec<Stamp>>,
 }
 
 impl Known {
-    fn watch(&mut self, Watched { own, others, reads }: Watched) {
+    fn watch(&mut self, files: Option<Vec<PathBuf>>) {
         let before = std::mem::take(&mut self.files);
-        let is_read = reads != self.reads;
-        self.reads = reads;
-        let own = (!own.is_empty()).then(|| PathBuf::from(own));
-        self.files = own
-            .into_iter()
-            .chain(others.iter().cloned())
-            .map(|file| {
-                let known = before.get(&file).filter(|_| !is_read).copied();
-                let stamp = known.unwrap_or_else(|| stamp(&file));
-                (file, stamp)
-            })
-            .collect();
+        let (known, files) = match files {
+            Some(files) => (before, files),
+            None => (BTreeMap::new(), before.into_keys().collect()),
+        };
+        let stamped = |file: PathBuf| {
+            let stamp = known.get(&file).copied().unwrap_or_else(|| stamp(&file));
+            (file, stamp)
+        };
+        self.files = files.into_iter().map(stamped).collect();
     }
 
     /// Whether they have changed and are written to their end.
@@ -125,28 +116,17 @@ fn stamp(file: &PathBuf) -> Stamp {
     Some((facts.len(), facts.modified().ok()?))
 }
 
-fn watch(latest: &Latest<[Watched; 2]>, changed: &[AtomicBool; 2], wake: &Wake) {
+fn watch(news: &Receiver<News>, changed: &[AtomicBool; 2], wake: &Wake) {
     let mut known = <[Known; 2]>::default();
     loop {
-        let mut has_waited = false;
         // Without files nothing wakes the processor.
-        let period = known.iter().any(|known| !known.files.is_empty()).then_some(PERIOD);
-        // `None` to end; the files are looked at without the lock.
-        let news = latest.wait(|slot| match slot.value.take() {
-            _ if slot.is_closed => ControlFlow::Break(None),
-            Some(news) => ControlFlow::Break(Some(Some(news))),
-            None if has_waited => ControlFlow::Break(Some(None)),
-            None => {
-                has_waited = true;
-                ControlFlow::Continue(period)
-            }
-        });
-        match news {
-            None => return,
-            Some(Some(news)) => {
-                known.iter_mut().zip(news).for_each(|(known, watched)| known.watch(watched));
-            }
-            Some(None) => {
+        let next = match known.iter().any(|known| !known.files.is_empty()) {
+            true => news.recv_timeout(PERIOD),
+            false => news.recv().map_err(RecvTimeoutError::from),
+        };
+        match next {
+            Ok((kind, files)) => known[kind as usize].watch(files),
+            Err(RecvTimeoutError::Timeout) => {
                 for (known, changed) in known.iter_mut().zip(changed) {
                     if known.have_changed() {
                         changed.store(true, Ordering::Relaxed);
@@ -154,6 +134,7 @@ fn watch(latest: &Latest<[Watched; 2]>, changed: &[AtomicBool; 2], wake: &Wake) 
                     }
                 }
             }
+            Err(RecvTimeoutError::Disconnected) => return,
         }
     }
 }
