@@ -71,11 +71,6 @@ impl Comparison {
         })
     }
 
-    /// Whether it changes with the picture that is rendered.
-    pub(super) fn shows_now(&self) -> bool {
-        self.is_difference && self.right.is_none()
-    }
-
     /// Whether something else is shown where the picture that is rendered would be.
     pub(super) fn covers_now(&self) -> bool {
         self.is_difference || self.right.is_some()

@@ -6,11 +6,11 @@ use glam::Vec2;
 
 /// A word at a place of the picture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Label {
+pub(in crate::app) struct Label {
     /// Its middle, both coordinates in `[0,1]`.
-    pub place: Vec2,
+    pub(in crate::app) place: Vec2,
     /// What it says.
-    pub text: String,
+    pub(in crate::app) text: String,
 }
 
 /// Half the width and height of a number as shares of the picture's width.

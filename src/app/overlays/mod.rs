@@ -1,20 +1,16 @@
 //! Pictures over the picture: what the grid knows and how sure the samples are, with legends.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use crate::environment::Environment;
 use crate::environment::sun::Sun;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
-use crate::path::World;
-use crate::radiance_cache::CacheFacts;
 use crate::render::film::{Film, Pixel};
 use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
 
 use super::document::Look;
+use super::worker::{Request, Snapshot};
 
 mod cache;
 mod cell_facts;
@@ -25,53 +21,43 @@ pub mod palette;
 
 pub use cache::length;
 pub use cell_facts::CellFacts;
-pub use labels::Label;
 pub use overlay::Overlay;
-pub use painted::{Legend, Painted};
+pub use painted::Legend;
+pub(super) use painted::Painted;
 use painted::{Range, scaled};
 
 /// What overlays are drawn from.
-pub struct Sources<'a> {
-    /// The film.
-    pub film: &'a Film,
-    /// The map.
-    pub environment: &'a Environment,
-    /// The distributions in use.
-    pub grid: Option<&'a Arc<LightGrid>>,
+pub(super) struct Sources<'a> {
+    /// The film, what was rendered with, and what was learned.
+    pub(super) snapshot: &'a Snapshot,
     /// Surfaces behind the film's pixels; only for overlays that need them.
-    pub surfaces: Option<&'a SurfaceMap>,
-    /// Facts of the cells of `grid`.
-    pub facts: Option<&'a CellFacts>,
-    /// What is in the radiance cache.
-    pub cache: Option<&'a CacheFacts>,
+    pub(super) surfaces: Option<&'a SurfaceMap>,
+    /// Facts of the cells of its grid.
+    pub(super) facts: Option<&'a CellFacts>,
     /// How light is developed, and the stops that are found out.
-    pub look: Option<(Look, f32)>,
+    pub(super) look: Option<(Look, f32)>,
     /// The tile chosen on the map.
-    pub tile: Option<u32>,
-    /// What the map's sun may shine on.
-    pub world: &'a World,
+    pub(super) tile: Option<u32>,
     /// The map's sun, unless the map is black.
-    pub sun: Option<&'a Sun>,
+    pub(super) sun: Option<&'a Sun>,
 }
 
 impl Sources<'_> {
     /// Draws; `None` while what it needs is not there.
-    pub fn paint(&self, overlay: Overlay) -> Option<Painted> {
+    pub(super) fn paint(&self, overlay: Overlay) -> Option<Painted> {
+        let pixels = self.snapshot.main.film.pixels().iter();
         match overlay {
-            Overlay::Samples => Some(scaled(
-                self.film.pixels().iter().map(|p| Some(p.samples() as f32)),
-                Range::Whole,
-                "samples",
-            )),
-            Overlay::Error => Some(scaled(
-                self.film.pixels().iter().map(relative_error),
-                Range::Logarithmic,
-                "of the luminance",
-            )),
+            Overlay::Samples => {
+                Some(scaled(pixels.map(|p| Some(p.samples() as f32)), Range::Whole, "samples"))
+            }
+            Overlay::Error => {
+                Some(scaled(pixels.map(relative_error), Range::Logarithmic, "of the luminance"))
+            }
             Overlay::Sun => self.sunlit(),
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
             _ if overlay.is_of_cache() => {
-                Some(cache::paint(overlay, self.cache?, self.surfaces?, self.look))
+                let facts = self.snapshot.cache.as_ref().ok()?;
+                Some(cache::paint(overlay, facts, self.surfaces?, self.look))
             }
             _ => self.cells(overlay),
         }
@@ -79,9 +65,10 @@ impl Sources<'_> {
 
     fn sunlit(&self) -> Option<Painted> {
         const SUNLIT: [u8; 3] = [255, 205, 70];
-        let (turns, _) = self.environment.rotation_and_intensity();
+        let Request { world, environment, .. } = &*self.snapshot.request;
+        let (turns, _) = environment.rotation_and_intensity();
         let (sun, degrees) = (self.sun?, 360.0 * f64::from(turns));
-        let is_lit = |spot: &&Spot| is_sunlit(self.world, sun, spot, degrees);
+        let is_lit = |spot: &&Spot| is_sunlit(world, sun, spot, degrees);
         let color = |spot: &Option<Spot>| spot.as_ref().filter(is_lit).map(|_| SUNLIT);
         let colors: Vec<_> = self.surfaces?.spots.par_iter().map(color).collect();
         let count = colors.iter().flatten().count();
@@ -91,7 +78,7 @@ impl Sources<'_> {
     }
 
     fn layer(&self, overlay: Overlay) -> Option<Painted> {
-        let layers = self.film.surface_layers()?;
+        let layers = self.snapshot.main.film.surface_layers()?;
         let srgb = |v: f32| (crate::color::srgb_from_linear(v.clamp(0.0, 1.0)) * 255.0) as u8;
         let is_hit = |normal: &[f32; 3]| *normal != [0.0; 3];
         Some(match overlay {
@@ -103,7 +90,10 @@ impl Sources<'_> {
             Overlay::Normal => {
                 let byte = |v: f32| ((v * 0.5 + 0.5) * 255.0).round() as u8;
                 let colors = layers.normal.iter().map(|n| is_hit(n).then(|| n.map(byte)));
-                Painted::new(colors.collect(), axes_legend())
+                let axes =
+                    [([255, 128, 128], "+X"), ([128, 255, 128], "+Y"), ([128, 128, 255], "+Z")];
+                let names = axes.map(|(color, name)| (color, name.to_owned())).to_vec();
+                Painted::new(colors.collect(), Legend::Names(names))
             }
             _ => {
                 let depths = layers.depth.iter().zip(&layers.normal);
@@ -114,14 +104,15 @@ impl Sources<'_> {
 
     fn cells(&self, overlay: Overlay) -> Option<Painted> {
         let surfaces = self.surfaces?;
-        let grid = self.grid?;
+        let grid = self.snapshot.main.grid.as_ref()?;
+        let environment = &self.snapshot.request.environment;
         let all = grid.grid()?;
         let facts = self.facts?;
         let cell_of = |spot: &Option<Spot>| spot.map(|s| all.cell_of(s.position, s.normal));
         let cells: Vec<Option<u32>> = surfaces.spots.iter().map(cell_of).collect();
         let distribution = |cell: u32| grid.distribution_of_cell(cell);
         // The map may have been another one, of more tiles.
-        let tile = self.tile.filter(|tile| *tile < self.environment.tile_count());
+        let tile = self.tile.filter(|tile| *tile < environment.tile_count());
         let value = |cell: u32| match overlay {
             Overlay::Visits => facts.visits(cell),
             Overlay::Sky => facts.visible_share(cell),
@@ -135,7 +126,7 @@ impl Sources<'_> {
             Overlay::Faces => return Some(faces(&cells, all)),
             Overlay::Learned => return Some(learned(&cells, grid)),
             Overlay::BestTile => {
-                let (columns, rows) = self.environment.tile_grid();
+                let (columns, rows) = environment.tile_grid();
                 let color = |cell| {
                     let tile = facts.best_tile[distribution(cell) as usize];
                     let u = (f64::from(tile % columns) + 0.5) / f64::from(columns);
@@ -148,7 +139,7 @@ impl Sources<'_> {
             Overlay::Visits => (Range::Logarithmic, "tries a cell"),
             Overlay::Sky => (Range::Logarithmic, "visibility times cosine"),
             Overlay::Entropy => {
-                let most = (self.environment.tile_count() as f32).log2();
+                let most = (environment.tile_count() as f32).log2();
                 (Range::Fixed(0.0, most), "bits")
             }
             Overlay::Distance => (Range::Fixed(0.0, 1.0), "total variation"),
@@ -198,11 +189,6 @@ fn with_borders(cells: &[Option<u32>], width: u32, grid: &SphericalGrid) -> Pain
 
 const FACE_COLORS: [[u8; 3]; 6] =
     [[224, 92, 92], [132, 52, 60], [120, 205, 110], [48, 104, 62], [98, 140, 235], [50, 66, 140]];
-
-fn axes_legend() -> Legend {
-    let names = [([255, 128, 128], "+X"), ([128, 255, 128], "+Y"), ([128, 128, 255], "+Z")];
-    Legend::Names(names.map(|(color, name)| (color, name.to_owned())).to_vec())
-}
 
 fn faces(cells: &[Option<u32>], grid: &SphericalGrid) -> Painted {
     let color = |cell| FACE_COLORS[grid.coordinates(cell).0 as usize % 6];

@@ -27,19 +27,23 @@ pub enum Legend {
     Empty,
 }
 
-/// An overlay's colours, one per pixel (`None` where it has nothing to say), and their meaning.
-pub struct Painted {
-    /// sRGB.
-    pub colors: Vec<Option<[u8; 3]>>,
+/// Colours of a picture's pixels in sRGB, `None` where there is nothing to say.
+type Colors = Vec<Option<[u8; 3]>>;
+
+/// An overlay's colours, one per pixel, and their meaning. On the device they are a texture.
+#[derive(Clone)]
+pub(in crate::app) struct Painted<C = Colors> {
+    /// They.
+    pub(in crate::app) colors: C,
     /// What they mean.
-    pub legend: Legend,
+    pub(in crate::app) legend: Legend,
     /// Words on the picture.
-    pub labels: Vec<Label>,
+    pub(in crate::app) labels: Vec<Label>,
 }
 
 impl Painted {
     /// Without words.
-    pub(super) fn new(colors: Vec<Option<[u8; 3]>>, legend: Legend) -> Self {
+    pub(super) fn new(colors: Colors, legend: Legend) -> Self {
         Self { colors, legend, labels: Vec::new() }
     }
 }

@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::carried::Carried;
-use super::order::{Order, Painted, Shown};
+use super::order::{Order, Shown};
 use super::recent::Recent;
 use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
-use crate::app::overlays::{CellFacts, Overlay, Sources};
+use crate::app::overlays::{CellFacts, Overlay, Painted, Sources};
 use crate::app::worker::{Request, Snapshot};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::environment::Environment;
@@ -91,7 +91,7 @@ struct Uploads {
     /// By the picture that is rendered, too, where that is compared.
     compared: Last<(Comparison, Option<SourceKey>), Compared>,
     metered: Last<(SourceKey, WhiteBalance), f32>,
-    overlay: Last<OverlayKey, Option<Painted>>,
+    overlay: Last<OverlayKey, Option<Painted<OverlayTexture>>>,
 }
 
 /// A picture with nothing beside or over it.
@@ -156,22 +156,21 @@ impl Memory {
         };
         let key = (source.key(), order.ahead.as_ref().map(|ahead| Arc::as_ptr(ahead) as usize));
         let complete = || Ok(self.carried.carry(order, own));
-        let Prepared { mut picture, image, is_carried, mut failure } =
-            self.uploads.completed.or_make(key, complete)?;
+        let completed = self.uploads.completed.or_make(key, complete)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(order) {
                 return Ok(ev);
             }
             let meter = || match source.is_dark() {
                 true => Ok(0.0),
-                false => developer.auto_exposure_ev(&picture, white_balance),
+                false => developer.auto_exposure_ev(&completed.picture, white_balance),
             };
             self.uploads.metered.or_make((source.key(), white_balance), meter)
         })?;
         self.automatic_ev = automatic_ev;
         let is_own = order.ahead.is_none() && order.snapshot.is_lasting() && !is_coarse;
-        if let Some(image) = image.as_ref().filter(|_| is_own) {
-            self.recent.keep(order, image, (is_carried, automatic_ev));
+        if let Some(image) = completed.image.as_ref().filter(|_| is_own) {
+            self.recent.keep(order, image, (completed.is_carried, automatic_ev));
         }
         if order.snapshot.request.view.crop.is_none() {
             self.whole = order.metered.map(|white_balance| Metered {
@@ -187,38 +186,37 @@ impl Memory {
             let mut last = std::mem::take(&mut self.uploads.overlay);
             let look = order.look.map(|look| (look, automatic_ev));
             let key = (order.snapshot.number, overlay, order.tile, look);
-            let painted = last.or_make(key, || Ok(self.paint(order, overlay, look, &picture)));
+            let paint = || Ok(self.paint(order, overlay, look, &completed.picture));
+            let painted = last.or_make(key, paint);
             self.uploads.overlay = last;
             painted
         })?;
-        let (mut other, mut difference, mut uncompared) = (None, None, None);
+        let mut shown = Shown { painted, ..shown(order, completed, automatic_ev) };
         if let Some(comparison) = &order.compared {
-            let own = image.clone().filter(|_| !is_carried);
+            let own = shown.image.clone().filter(|_| !shown.is_carried);
             let now = || own.unwrap_or_else(|| Arc::new(source.session.film.image()));
-            let of = comparison.shows_now().then(|| source.key());
+            let shows_now = comparison.is_difference && comparison.right.is_none();
+            let of = shows_now.then(|| source.key());
             let compare = || Ok(comparison.prepare(&developer, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
-            picture = compared.picture.unwrap_or(picture);
-            (other, difference) = (compared.other, compared.difference);
+            shown.picture = compared.picture.unwrap_or(shown.picture);
+            (shown.other, shown.difference) = (compared.other, compared.difference);
             // The small picture of a movement has another size for a moment.
-            uncompared = compared.failure.filter(|_| {
-                let view = &order.snapshot.request.view;
-                let size =
-                    image.as_ref().map_or((view.width, view.height), |i| (i.width, i.height));
-                order.snapshot.is_whole() && size == (view.width, view.height)
-            });
+            let view = &order.snapshot.request.view;
+            let is_of_size =
+                |image: &Arc<Image>| (image.width, image.height) == (view.width, view.height);
+            let is_final = order.snapshot.is_whole() && shown.image.as_ref().is_none_or(is_of_size);
+            shown.uncompared = compared.failure.filter(|_| is_final);
         } else if let Some(source) = Source::plain(order) {
             let prepare = || Ok(source.prepare(&developer, cancel));
             let Some(plain) = self.uploads.plain.or_try(source.key(), prepare)? else {
                 return Ok(None);
             };
-            (other, failure) = (Some(plain.picture), failure.or(plain.failure));
+            (shown.other, shown.failure) = (Some(plain.picture), shown.failure.or(plain.failure));
         }
         developer.gpu.check()?;
-        let prepared = Prepared { picture, image, is_carried, failure };
-        let shown = shown(order, prepared, automatic_ev);
         self.mix.clone_from(mix);
-        Ok(Some(Shown { is_coarse, other, difference, uncompared, painted, ..shown }))
+        Ok(Some(Shown { is_coarse, ..shown }))
     }
 
     /// The request ahead as it was left, else what the last picture shows of its view; and the automatic stops of that
@@ -280,26 +278,20 @@ impl Memory {
         overlay: Overlay,
         look: Option<(Look, f32)>,
         picture: &LinearPicture,
-    ) -> Option<Painted> {
-        let snapshot = &order.snapshot;
-        let session = &snapshot.main;
+    ) -> Option<Painted<OverlayTexture>> {
         if overlay.needs_surfaces() {
-            self.prepare(snapshot);
+            self.prepare(&order.snapshot);
         }
         let sources = Sources {
-            film: &session.film,
-            environment: &snapshot.request.environment,
-            grid: session.grid.as_ref(),
+            snapshot: &order.snapshot,
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
-            cache: snapshot.cache.as_deref().ok(),
             look,
             tile: order.tile,
-            world: &snapshot.request.world,
             sun: order.sun.as_ref(),
         };
         let painted = sources.paint(overlay)?;
-        let (gpu, width) = (&order.developer.gpu, session.film.width);
+        let (gpu, width) = (&order.developer.gpu, order.snapshot.main.film.width);
         let colors = OverlayTexture::of_colors(gpu, &painted.colors, width, picture);
         Some(Painted { colors, legend: painted.legend, labels: painted.labels })
     }

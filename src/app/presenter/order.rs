@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::app::comparison::Comparison;
 use crate::app::document::Look;
-use crate::app::overlays::{Label, Legend, Overlay};
+use crate::app::overlays::{Overlay, Painted};
 use crate::app::worker::{Activity, Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
@@ -122,17 +122,6 @@ impl Order {
     }
 }
 
-/// An overlay on the device.
-#[derive(Clone)]
-pub(in crate::app) struct Painted {
-    /// Its colours, one a pixel of the picture.
-    pub(in crate::app) colors: OverlayTexture,
-    /// What they mean.
-    pub(in crate::app) legend: Legend,
-    /// What it writes on the picture.
-    pub(in crate::app) labels: Vec<Label>,
-}
-
 /// What the screen is developed from.
 pub(crate) struct Shown {
     /// What was ordered.
@@ -149,8 +138,8 @@ pub(crate) struct Shown {
     pub(in crate::app) other: Option<LinearPicture>,
     /// Stops that bring the picture to middle grey; 0 unless measured.
     pub automatic_ev: f32,
-    /// The overlay.
-    pub(in crate::app) painted: Option<Painted>,
+    /// The overlay on the device.
+    pub(in crate::app) painted: Option<Painted<OverlayTexture>>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
     /// How far apart the pictures are whose difference is shown: [`crate::metrics::relative_rms_error`].
