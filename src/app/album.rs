@@ -9,11 +9,8 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use egui::{Color32, ColorImage};
-
 use super::document::Document;
 use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels, SMALL_WIDTH};
-use super::screen::color_image;
 use super::settings_file;
 use crate::error::{At as _, Error, Result};
 use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
@@ -68,25 +65,22 @@ impl Album {
     }
 
     /// Writes a picture, one day soon; where. From then on its pixels are there and no more in memory.
-    pub(super) fn write(&mut self, kept: &KeptPicture, small: &Rgb8) -> Result<PathBuf> {
+    pub(super) fn write(&mut self, kept: &KeptPicture) -> Result<PathBuf> {
         // In the order of time, and never that of another window.
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let (time, process) = (since.as_millis(), std::process::id());
         let file = self.folder.join(format!("{time:015}-{process}-{:04}.exr", self.written));
         self.written += 1;
-        self.write_to(file.clone(), kept, small)?;
+        self.write_to(file.clone(), kept)?;
         Ok(file)
     }
 
     /// Writes a picture's file again, if it has one: its name is another.
     pub(super) fn write_again(&self, kept: &KeptPicture) -> Result<()> {
-        let Some(file) = &kept.file else { return Ok(()) };
-        let [width, height] = kept.small.size.map(|size| size as u32);
-        let pixels = kept.small.pixels.iter().map(|color| [color.r(), color.g(), color.b()]);
-        self.write_to(file.clone(), kept, &Rgb8 { width, height, pixels: pixels.collect() })
+        kept.file.clone().map_or(Ok(()), |file| self.write_to(file, kept))
     }
 
-    fn write_to(&self, file: PathBuf, kept: &KeptPicture, small: &Rgb8) -> Result<()> {
+    fn write_to(&self, file: PathBuf, kept: &KeptPicture) -> Result<()> {
         let document = &kept.document;
         let lasting = Document {
             scene: settings_file::lasting_scene(&document.scene),
@@ -100,7 +94,7 @@ impl Album {
             (OF_SCENE, to_json(&kept.of_scene)?),
         ];
         let texts = texts.map(|(key, text)| (key.to_owned(), text));
-        let (pixels, small) = (Arc::clone(&kept.pixels), small.clone());
+        let (pixels, small) = (Arc::clone(&kept.pixels), kept.small.clone());
         self.send(move || {
             if let Some(folder) = file.parent() {
                 std::fs::create_dir_all(folder).at(folder)?;
@@ -193,16 +187,17 @@ fn read(file: &Path) -> Result<KeptPicture> {
         Err(_) => SceneOptions::default(),
     };
     // A program that has had the file in its hands may have left none, or a large one.
-    let is_small = |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH;
-    let small = read_exr_preview(file)?.filter(is_small).as_ref().map(color_image);
-    let none = || ColorImage::filled([1, 1], Color32::GRAY);
+    let is_small =
+        |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH && !small.pixels.is_empty();
+    let small = read_exr_preview(file)?.filter(is_small);
+    let grey = || Rgb8 { width: 1, height: 1, pixels: vec![[160; 3]] };
     Ok(KeptPicture {
         name: text(NAME)?.to_owned(),
         summary: text(SUMMARY)?.to_owned(),
         pixels: Arc::new(Pixels::of_file(file.to_owned())),
         document,
         of_scene,
-        small: small.filter(|small| !small.pixels.is_empty()).unwrap_or_else(none),
+        small: small.unwrap_or_else(grey),
         texture: None,
         file: Some(file.to_owned()),
     })
@@ -264,7 +259,7 @@ mod tests {
             pixels: Arc::new(Pixels::new(image)),
             document,
             of_scene: SceneOptions { hide: vec!["glass".to_owned()], ..SceneOptions::default() },
-            small: color_image(&small),
+            small,
             texture: None,
             file: None,
         }
@@ -272,7 +267,7 @@ mod tests {
 
     /// Gives a picture with these settings to an album.
     fn write(album: &mut Album, name: &str, document: Document) -> PathBuf {
-        album.write(&kept(name, document), &picture().1).expect("told")
+        album.write(&kept(name, document)).expect("told")
     }
 
     #[test]
@@ -286,7 +281,7 @@ mod tests {
             write(&mut album, name, document());
         }
         let third = kept("Picture 3", document());
-        let last = album.write(&third, &small).expect("told");
+        let last = album.write(&third).expect("told");
         // The last picture before the window is closed is not lost.
         drop(album);
         fs::remove_file(&last).expect("it is there");
@@ -300,7 +295,7 @@ mod tests {
         assert_eq!(kept[1].document, expected);
         assert_eq!(kept[1].summary, "plain, 3 samples");
         assert_eq!(kept[1].of_scene.hide, ["glass"]);
-        assert_eq!(kept[1].small, color_image(&small));
+        assert_eq!(kept[1].small, small);
         assert_eq!(kept[1].pixels.get(), Ok(image));
         let first = kept[0].file.clone().expect("a file");
         let renamed = KeptPicture { name: "Before noon".to_owned(), ..read(&first).expect("read") };
@@ -372,7 +367,7 @@ mod tests {
         let newest: Vec<_> =
             (2..MAX_PICTURES + 2).map(|number| format!("Picture {number}")).collect();
         assert_eq!(names, newest);
-        assert_eq!(kept[MAX_PICTURES - 1].small.size, [1, 1]);
+        assert_eq!(kept[MAX_PICTURES - 1].small.pixels.len(), 1);
         assert!(files.iter().all(|file| file.exists()), "nothing of others is removed");
     }
 }

@@ -172,7 +172,7 @@ impl App {
 
     /// Waits until all files are written; what has failed of that and was not yet told.
     pub fn finish(&mut self) -> Vec<String> {
-        self.library.history.finish();
+        self.library.history.album = None;
         let mut failures = self.tasks.finish();
         let why = "the window was closed before its picture was there";
         failures.extend(self.saves.give_up(why));

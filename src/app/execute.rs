@@ -217,7 +217,7 @@ impl App {
             let whole = part * (bottom - top) / (right - left);
             document.follow_room(whole / self.interface.aspect());
         }
-        if self.library.history.is_of_other_options(kept) {
+        if kept.of_scene != self.library.history.of_scene {
             self.messages.notice(format!(
                 "{}: its scene was opened with other options than now (--variant, --outlines, \
                  --hide, --material), which only the command line gives",
@@ -294,8 +294,7 @@ impl App {
         let small = look.white_balance.apply(image.shrunk(SMALL_WIDTH));
         let exposure_ev = self.display.exposure_ev(document).unwrap_or_default();
         let small = display_rgb8(&small, exposure_ev, look.curve);
-        let kept = self.library.history.keep(summary, &image, document.clone(), &small);
-        let (index, failure) = kept;
+        let (index, failure) = self.library.history.keep(summary, &image, document.clone(), small);
         if let Err(error) = failure {
             self.messages.error(error.to_string());
         }

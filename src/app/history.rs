@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::album::Album;
 use super::document::Document;
 use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels};
-use super::screen::color_image;
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
 use crate::scene::SceneOptions;
@@ -16,21 +15,16 @@ pub(crate) struct History {
     /// All of them.
     pub(crate) list: Vec<KeptPicture>,
     count: u32,
-    /// The folder that keeps them for the next window.
+    /// The folder that keeps them for the next window; its end waits until everything is written.
     pub(super) album: Option<Album>,
     /// What is asked of the files of scenes.
-    of_scene: SceneOptions,
+    pub(super) of_scene: SceneOptions,
 }
 
 impl History {
     /// Of a window in which so much is asked of the files of scenes.
     pub(crate) fn new(of_scene: SceneOptions) -> Self {
         Self { of_scene, ..Self::default() }
-    }
-
-    /// Waits until everything is written.
-    pub(crate) fn finish(&mut self) {
-        self.album = None;
     }
 
     /// Takes over what earlier windows left; how many those are.
@@ -56,7 +50,7 @@ impl History {
         summary: String,
         image: &Arc<Image>,
         document: Document,
-        small: &Rgb8,
+        small: Rgb8,
     ) -> (usize, Result<()>) {
         self.count = self.count.saturating_add(1);
         let kept = KeptPicture {
@@ -65,12 +59,12 @@ impl History {
             pixels: Arc::new(Pixels::new(Arc::clone(image))),
             document,
             of_scene: self.of_scene.clone(),
-            small: color_image(small),
+            small,
             texture: None,
             file: None,
         };
-        let mut write = |album: &mut Album| album.write(&kept, small);
-        let (file, failure) = match self.album.as_mut().map(&mut write).transpose() {
+        let written = self.album.as_mut().map(|album| album.write(&kept)).transpose();
+        let (file, failure) = match written {
             Ok(file) => (file, Ok(())),
             Err(error) => (None, Err(error)),
         };
@@ -79,11 +73,6 @@ impl History {
             self.remove(0);
         }
         (self.list.len() - 1, failure)
-    }
-
-    /// Whether something else was asked of a picture's scene than in this window.
-    pub(crate) fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
-        kept.of_scene != self.of_scene
     }
 
     /// Gives a picture another name, here and in its file.
@@ -115,7 +104,7 @@ mod tests {
         for _ in 0..=MAX_PICTURES {
             let image = Arc::new(Image::filled(1, 1, [0.0; 3]));
             let small = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
-            history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
+            history.keep(String::new(), &image, Document::default(), small).1.expect("kept");
         }
         assert_eq!(history.list.len(), MAX_PICTURES);
         assert_eq!(history.list[0].name, "Picture 2");
@@ -139,12 +128,12 @@ mod tests {
         let keep = |history: &mut History| {
             let image = Arc::new(Image::filled(1, 1, [0.5; 3]));
             let small = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
-            history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
+            history.keep(String::new(), &image, Document::default(), small).1.expect("kept");
         };
         let (mut history, earlier) = open();
         assert!(earlier.is_empty());
         (0..MAX_PICTURES).for_each(|_| keep(&mut history));
-        history.finish();
+        history.album = None;
         let (mut history, earlier) = open();
         // Before the earlier ones are taken over.
         keep(&mut history);
@@ -154,7 +143,7 @@ mod tests {
         let names: Vec<_> = history.list.iter().map(|kept| kept.name.clone()).collect();
         assert_eq!(names[0], "Picture 3");
         assert_eq!(names[MAX_PICTURES - 1], format!("Picture {}", MAX_PICTURES + 2));
-        history.finish();
+        history.album = None;
         assert_eq!(open().1.len(), MAX_PICTURES);
         assert_eq!(std::fs::read_dir(temporary.path()).expect("a folder").count(), MAX_PICTURES);
     }

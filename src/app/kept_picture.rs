@@ -1,14 +1,14 @@
 //! A picture that was kept.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::sync::{Arc, Mutex, Weak};
 
-use egui::{ColorImage, TextureHandle};
+use egui::TextureHandle;
 
 use super::document::Document;
 use super::threads::lock;
 use crate::error::Decoded;
-use crate::image::{Image, read_picture};
+use crate::image::{Image, Rgb8, read_picture};
 use crate::scene::SceneOptions;
 
 /// Most pictures kept.
@@ -30,7 +30,7 @@ pub(crate) struct KeptPicture {
     /// What was asked of the scene's file besides.
     pub of_scene: SceneOptions,
     /// It in small.
-    pub small: ColorImage,
+    pub small: Rgb8,
     /// The same on the device, once it was drawn.
     pub texture: Option<TextureHandle>,
     /// Where it is for the next window.
@@ -58,7 +58,7 @@ impl Pixels {
 
     /// Leaves them to a file that they were written to.
     pub(crate) fn leave_to(&self, file: PathBuf) {
-        let mut source = self.source();
+        let mut source = lock(&self.0);
         if let Source::Here(image) = &*source {
             let known = Arc::downgrade(image);
             *source = Source::InFile(file, known);
@@ -70,7 +70,7 @@ impl Pixels {
     /// # Errors
     /// If their file cannot be read.
     pub(crate) fn get(&self) -> Decoded<Arc<Image>> {
-        match &mut *self.source() {
+        match &mut *lock(&self.0) {
             Source::Here(image) => Ok(Arc::clone(image)),
             Source::InFile(file, known) => {
                 if let Some(image) = known.upgrade() {
@@ -82,10 +82,6 @@ impl Pixels {
                 Ok(image)
             }
         }
-    }
-
-    fn source(&self) -> MutexGuard<'_, Source> {
-        lock(&self.0)
     }
 }
 

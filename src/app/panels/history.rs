@@ -8,6 +8,7 @@ use super::controls::Controls;
 use crate::app::commands::Command;
 use crate::app::history::History;
 use crate::app::kept_picture::KeptPicture;
+use crate::app::screen::color_image;
 use crate::app::theme;
 
 /// Height of a small picture in points.
@@ -98,7 +99,7 @@ fn side(ui: &mut Ui, chosen: &mut Option<usize>, index: usize, name: &str) {
 
 fn small(ui: &mut Ui, kept: &mut KeptPicture) -> egui::Response {
     let texture = kept.texture.get_or_insert_with(|| {
-        ui.ctx().load_texture(&kept.name, kept.small.clone(), TextureOptions::LINEAR)
+        ui.ctx().load_texture(&kept.name, color_image(&kept.small), TextureOptions::LINEAR)
     });
     let size = Vec2::new(HEIGHT * texture.aspect_ratio(), HEIGHT).min(Vec2::new(96.0, HEIGHT));
     let image = Image::new((texture.id(), size)).sense(Sense::click());
