@@ -86,9 +86,4 @@ impl Rendering {
         let is_preparing = choice != DeviceChoice::Cpu && self.worker.is_preparing();
         is_preparing || self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some())
     }
-
-    /// Seconds of work on the picture.
-    pub(super) fn seconds(&self) -> f64 {
-        self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.seconds())
-    }
 }

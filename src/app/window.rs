@@ -87,8 +87,7 @@ pub(crate) fn run(
         notices,
         settings_path,
         running: None,
-        failure: None,
-        loss: None,
+        outcome: Ok(None),
         repaint_at: None,
         asked: Arc::default(),
     };
@@ -100,7 +99,7 @@ pub(crate) fn run(
         runner.end();
         return Ok(Some(Error::new(format!("the window was closed: {error}"))));
     }
-    runner.failure.map_or(Ok(runner.loss), Err)
+    runner.outcome
 }
 
 struct Runner {
@@ -109,10 +108,8 @@ struct Runner {
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
     running: Option<Running>,
-    /// Why no window was opened.
-    failure: Option<Error>,
-    /// Why it was closed.
-    loss: Option<Error>,
+    /// What closed the window, if it was not a person; or why none was opened.
+    outcome: Result<Option<Error>>,
     repaint_at: Option<Instant>,
     /// Whether a signal asked for the end.
     asked: Arc<AtomicBool>,
@@ -133,16 +130,10 @@ fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
 
 /// What there is once a window is open.
 struct Running {
-    window: Arc<Window>,
-    context: egui::Context,
+    canvas: Canvas,
     input: egui_winit::State,
-    display: OwnedDisplayHandle,
-    adapter: Option<String>,
     /// There is none only while one is exchanged for another.
     painter: Option<Painter>,
-    copies: TextureCopies,
-    /// Whether the surface is to be configured before it is painted on.
-    is_stale: Arc<AtomicBool>,
     /// When a device was lost last, and how many were in a row.
     lost: Option<(Instant, u32)>,
     /// When the last frame was drawn.
@@ -157,16 +148,21 @@ struct Running {
     usual_size: Option<[f32; 2]>,
 }
 
+/// The window, and what it takes to draw on it by any device.
+struct Canvas {
+    window: Arc<Window>,
+    context: egui::Context,
+    display: OwnedDisplayHandle,
+    adapter: Option<String>,
+    copies: TextureCopies,
+    /// Whether the surface is to be configured before it is painted on.
+    is_stale: Arc<AtomicBool>,
+}
+
 /// Draws on the window by the best device that can, which is opened with all that rendering needs.
-fn paint_on(
-    window: &Arc<Window>,
-    context: &egui::Context,
-    display: &OwnedDisplayHandle,
-    adapter: Option<&str>,
-    copies: &TextureCopies,
-    is_stale: &Arc<AtomicBool>,
-) -> Result<(Painter, Screen)> {
-    let gpu = Gpu::open_for_window(adapter, display, window)?;
+fn paint_on(canvas: &Canvas) -> Result<(Painter, Screen)> {
+    let Canvas { window, context, display, adapter, copies, is_stale } = canvas;
+    let gpu = Gpu::open_for_window(adapter.as_deref(), display, window)?;
     let usual = WgpuConfiguration::default();
     let (answer, is_stale) = (usual.on_surface_status.clone(), Arc::clone(is_stale));
     let config = WgpuConfiguration {
@@ -240,12 +236,15 @@ impl Runner {
             // The event loop may have ended meanwhile.
             let _ = proxy.send_event(Call::Repaint(Instant::now() + info.delay));
         });
-        let display = event_loop.owned_display_handle();
-        let adapter = start.adapter.clone();
-        let (copies, is_stale) = (TextureCopies::default(), Arc::default());
-        let (painter, screen) =
-            paint_on(&window, &context, &display, adapter.as_deref(), &copies, &is_stale)
-                .map_err(|e| cannot(&e))?;
+        let canvas = Canvas {
+            window: Arc::clone(&window),
+            context: context.clone(),
+            display: event_loop.owned_display_handle(),
+            adapter: start.adapter.clone(),
+            copies: TextureCopies::default(),
+            is_stale: Arc::default(),
+        };
+        let (painter, screen) = paint_on(&canvas).map_err(|e| cannot(&e))?;
         let input = egui_winit::State::new(
             context.clone(),
             ViewportId::ROOT,
@@ -255,17 +254,12 @@ impl Runner {
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
         let mut app = App::new(start, loader, screen, &context, wakes)?;
-        app.desktop.window = Some(Arc::clone(&window));
+        app.desktop.window = Some(window);
         self.notices.drain(..).for_each(|sentence| app.messages.notice(sentence));
         Ok(Running {
-            window,
-            context,
+            canvas,
             input,
-            display,
-            adapter,
             painter: Some(painter),
-            copies,
-            is_stale,
             lost: None,
             drawn_at: Instant::now(),
             touched_at: None,
@@ -284,7 +278,7 @@ impl Runner {
     fn close(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(running) = &self.running {
             // A GPU that is being made ready cannot be stopped; nobody has to look at that.
-            running.window.set_visible(false);
+            running.canvas.window.set_visible(false);
         }
         self.end();
         event_loop.exit();
@@ -314,11 +308,11 @@ impl Running {
 
     /// Notes the size for the next window.
     fn note_size(&mut self, size: PhysicalSize<u32>) {
-        let is_usual =
-            self.window.is_minimized() != Some(true) && self.window.fullscreen().is_none();
-        let is_usual = is_usual && !self.window.is_maximized();
+        let is_usual = self.canvas.window.is_minimized() != Some(true)
+            && self.canvas.window.fullscreen().is_none();
+        let is_usual = is_usual && !self.canvas.window.is_maximized();
         if size.width > 0 && size.height > 0 && is_usual {
-            let size = size.to_logical(self.window.scale_factor());
+            let size = size.to_logical(self.canvas.window.scale_factor());
             self.usual_size = Some([size.width, size.height]);
         }
     }
@@ -328,9 +322,9 @@ impl Running {
     /// # Errors
     /// If there is no other.
     fn draw(&mut self) -> Result<()> {
-        let PhysicalSize { width, height } = self.window.inner_size();
+        let PhysicalSize { width, height } = self.canvas.window.inner_size();
         let size = NonZeroU32::new(width).zip(NonZeroU32::new(height));
-        let Some(size) = size.filter(|_| self.window.is_minimized() != Some(true)) else {
+        let Some(size) = size.filter(|_| self.canvas.window.is_minimized() != Some(true)) else {
             // There is nothing to draw on; it is asked for again when there is.
             return Ok(());
         };
@@ -338,24 +332,24 @@ impl Running {
         if let Err(loss) = self.app.display.screen.gpu().check() {
             self.replace_device(&loss)?;
         }
-        let mut input = self.input.take_egui_input(&self.window);
+        let mut input = self.input.take_egui_input(&self.canvas.window);
         let later = input_order::first_turn(&mut input.events);
         if !later.is_empty() {
             self.input.egui_input_mut().events = later;
-            self.context.request_repaint();
+            self.canvas.context.request_repaint();
         }
         let was_modal = self.app.interface.is_modal();
-        let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
+        let mut output = self.canvas.context.run_ui(input, |ui| self.app.show(ui));
         if self.app.interface.is_modal() && !was_modal {
             // Or a tooltip from before lies over the question until the pointer moves.
             self.input.egui_input_mut().events.push(egui::Event::PointerGone);
         }
-        self.input.handle_platform_output(&self.window, output.platform_output);
+        self.input.handle_platform_output(&self.canvas.window, output.platform_output);
         let points = output.pixels_per_point;
-        let primitives = self.context.tessellate(output.shapes, points);
-        self.copies.follow(&output.textures_delta);
+        let primitives = self.canvas.context.tessellate(output.shapes, points);
+        self.canvas.copies.follow(&output.textures_delta);
         let gpu = self.app.display.screen.gpu().clone();
-        let is_stale = self.is_stale.swap(false, Ordering::Relaxed);
+        let is_stale = self.canvas.is_stale.swap(false, Ordering::Relaxed);
         let mut paint = || {
             let Some(painter) = &mut self.painter else { return };
             if is_stale {
@@ -368,7 +362,7 @@ impl Running {
                 &primitives,
                 &mut output.textures_delta,
                 Vec::new(),
-                &self.window,
+                &self.canvas.window,
             );
         };
         // egui's renderer panics if the device is lost while it draws.
@@ -377,21 +371,21 @@ impl Running {
             false => paint(),
         }));
         output.textures_delta.clear();
-        if self.is_stale.load(Ordering::Relaxed) {
-            self.context.request_repaint();
+        if self.canvas.is_stale.load(Ordering::Relaxed) {
+            self.canvas.context.request_repaint();
         }
         if self.app.display.screen.gpu().check().is_err() {
-            self.context.request_repaint();
+            self.canvas.context.request_repaint();
         } else if let Err(panic) = drawn {
             resume_unwind(panic);
         }
         if std::mem::take(&mut self.app.toggles_full_screen) {
-            let fills = self.window.fullscreen().is_some();
-            self.window.set_fullscreen((!fills).then_some(Fullscreen::Borderless(None)));
+            let fills = self.canvas.window.fullscreen().is_some();
+            self.canvas.window.set_fullscreen((!fills).then_some(Fullscreen::Borderless(None)));
         }
         let title = format!("{} - lightgrid", self.app.edited.document.scene);
         if title != self.title {
-            self.window.set_title(&title);
+            self.canvas.window.set_title(&title);
             self.title = title;
         }
         self.drawn_at = Instant::now();
@@ -404,14 +398,16 @@ impl Running {
 
     /// When the next frame of what is new can be afforded.
     fn rested_at(&self) -> Instant {
-        let longest = MAX_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.rendering.seconds());
+        let snapshot = self.app.rendering.snapshot.as_ref();
+        let seconds = snapshot.map_or(0.0, |snapshot| snapshot.seconds());
+        let longest = MAX_REST.as_secs_f64().min(REST_OF_A_SECOND * seconds);
         self.least_rested_at().max(self.drawn_at + self.rest.min(Duration::from_secs_f64(longest)))
     }
 
     /// When the next frame of whatever can be afforded.
     fn least_rested_at(&self) -> Instant {
         let is_touched = self.touched_at.is_some_and(|at| at.elapsed() < TOUCH)
-            || self.context.egui_is_using_pointer();
+            || self.canvas.context.egui_is_using_pointer();
         self.drawn_at + self.rest.min(if is_touched { self.rest / REST } else { MIN_REST })
     }
 
@@ -427,16 +423,7 @@ impl Running {
         self.lost = Some((Instant::now(), before + 1));
         // Two surfaces of one window exclude each other.
         self.painter = None;
-        let adapter = self.adapter.as_deref();
-        let (painter, screen) = paint_on(
-            &self.window,
-            &self.context,
-            &self.display,
-            adapter,
-            &self.copies,
-            &self.is_stale,
-        )
-        .map_err(|e| closes(&e))?;
+        let (painter, screen) = paint_on(&self.canvas).map_err(|e| closes(&e))?;
         self.painter = Some(painter);
         self.app.move_to(screen, loss);
         Ok(())
@@ -449,11 +436,11 @@ impl ApplicationHandler<Call> for Runner {
         match self.open(event_loop, start) {
             Ok(running) => {
                 close_on_signals(&self.asked, self.proxy.clone());
-                running.window.request_redraw();
+                running.canvas.window.request_redraw();
                 self.running = Some(running);
             }
             Err(error) => {
-                self.failure = Some(error);
+                self.outcome = Err(error);
                 event_loop.exit();
             }
         }
@@ -467,7 +454,7 @@ impl ApplicationHandler<Call> for Runner {
         let at = match call {
             Call::Repaint(at) => at.max(running.least_rested_at()),
             Call::Draw => running.rested_at(),
-            Call::Relay if running.app.relay(&running.context) => running.rested_at(),
+            Call::Relay if running.app.relay(&running.canvas.context) => running.rested_at(),
             Call::Relay => running.rested_at().max(running.drawn_at + STATUS_GAP),
         };
         self.repaint(at);
@@ -482,13 +469,13 @@ impl ApplicationHandler<Call> for Runner {
             }
             WindowEvent::RedrawRequested => {
                 let drawn = running.draw();
-                if running.app.library.take_news()
+                if std::mem::take(&mut running.app.library.has_news)
                     && let Err(error) = running.keep_settings(self.settings_path.as_deref(), false)
                 {
                     running.app.messages.notice(error.to_string());
                 }
                 if drawn.is_err() || running.app.is_closing {
-                    self.loss = drawn.err();
+                    self.outcome = Ok(drawn.err());
                     self.close(event_loop);
                 }
                 return;
@@ -510,7 +497,7 @@ impl ApplicationHandler<Call> for Runner {
             | WindowEvent::Touch(_) => running.touched_at = Some(Instant::now()),
             _ => {}
         }
-        if running.input.on_window_event(&running.window, &event).repaint {
+        if running.input.on_window_event(&running.canvas.window, &event).repaint {
             let at = running.least_rested_at();
             self.repaint(at);
         }
@@ -521,7 +508,7 @@ impl ApplicationHandler<Call> for Runner {
         match self.repaint_at {
             Some(at) if at <= Instant::now() + Duration::from_millis(1) => {
                 self.repaint_at = None;
-                running.window.request_redraw();
+                running.canvas.window.request_redraw();
                 event_loop.set_control_flow(ControlFlow::Wait);
             }
             Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),
