@@ -170,7 +170,6 @@ struct InFlight {
     name: String,
     /// Whether the scene is there and only its materials change, or the map and only its sun.
     is_edit: bool,
-    number: u64,
     began: Instant,
     /// What its thread is doing.
     step: Arc<Mutex<&'static str>>,
@@ -203,13 +202,11 @@ pub struct Loading<'a> {
 
 /// Loads one scene and one map at a time; results are collected with [`Loader::take`].
 pub struct Loader {
-    /// Results with the number of what was under way.
-    sender: Sender<(u64, Loaded)>,
-    receiver: Receiver<(u64, Loaded)>,
+    /// Results with the steps of what was under way.
+    sender: Sender<(Steps, Loaded)>,
+    receiver: Receiver<(Steps, Loaded)>,
     wake: Wake,
     in_flight: [Option<InFlight>; 2],
-    /// So many were begun.
-    begun: u64,
     /// The scene that the window was opened with, and what is asked of it.
     first: (String, SceneOptions),
     /// One scene and one map at a time, side by side as on the command line: two large scenes together
@@ -223,7 +220,7 @@ impl Loader {
         let (sender, receiver) = channel();
         let (in_flight, turns) = ([None, None], Default::default());
         let first = (document.scene.clone(), options);
-        let mut loader = Self { sender, receiver, wake, in_flight, begun: 0, first, turns };
+        let mut loader = Self { sender, receiver, wake, in_flight, first, turns };
         loader.load_scene(&document.scene);
         loader.load_map(&document.map, document.sun);
         loader
@@ -280,8 +277,8 @@ impl Loader {
     /// What has been loaded since the last call, by name; results nobody waits for any more are dropped.
     pub fn take(&mut self) -> Vec<(String, Loaded)> {
         let mut results = Vec::new();
-        for (number, loaded) in self.receiver.try_iter() {
-            let is_this = |in_flight: &mut InFlight| in_flight.number == number;
+        for (Steps(step), loaded) in self.receiver.try_iter() {
+            let is_this = |of: &mut InFlight| Arc::as_ptr(&of.step) == step.as_ptr();
             let found = self.in_flight.iter_mut().find_map(|slot| slot.take_if(is_this));
             results.extend(found.map(|in_flight| (in_flight.name, loaded)));
         }
@@ -299,11 +296,9 @@ impl Loader {
         if in_flight.as_ref().is_some_and(|it| it.name == name && (is_edit || !it.is_edit)) {
             return;
         }
-        self.begun += 1;
-        let number = self.begun;
         let (began, step) = (Instant::now(), Arc::new(Mutex::new("waiting")));
         let steps = Steps(Arc::downgrade(&step));
-        *in_flight = Some(InFlight { name: name.to_owned(), is_edit, number, began, step });
+        *in_flight = Some(InFlight { name: name.to_owned(), is_edit, began, step });
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let turn = Arc::clone(&self.turns[kind as usize]);
         let name = name.to_owned();
@@ -319,7 +314,7 @@ impl Loader {
                 Kind::Map => Loaded::Map(Err(failed())),
             });
             // The window may have gone meanwhile.
-            let _ = sender.send((number, loaded));
+            let _ = sender.send((steps, loaded));
             wake();
         });
         if thread.is_err() {
