@@ -23,16 +23,6 @@ const SETTLING_FRAMES: u32 = 4;
 /// Seconds between two drawn frames, as far as the interface can tell.
 const FRAME_SECONDS: f64 = 0.5;
 
-/// What a screenshot shows.
-pub struct Shot {
-    /// The application's start; [`Start::is_repeatable`] is set.
-    pub start: Start,
-    /// Size in pixels.
-    pub size: (u32, u32),
-    /// Longest wait for the samples.
-    pub patience: Duration,
-}
-
 /// Draws one window, in one state or several.
 pub struct Studio {
     pub(super) app: App,
@@ -46,20 +36,23 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Starts the application without a display.
+    /// Starts the application without a display, in a window of so many pixels; [`Start::is_repeatable`] is set.
+    /// `patience` is the longest wait for the samples.
     ///
     /// # Errors
     /// If there is no graphics device, for which software Vulkan suffices, or it draws nothing of this size.
-    pub fn open(shot: Shot) -> Result<Self> {
-        let gpu = open(shot.start.adapter.as_deref())?;
-        let ((width, height), most) = (shot.size, gpu.limits.max_texture_dimension_2d);
+    pub fn open(start: Start, size: (u32, u32), patience: Duration) -> Result<Self> {
+        let gpu = Gpu::open(start.adapter.as_deref()).map_err(|e| {
+            Error::new(format!("there is no graphics device to draw the window with: {e}"))
+        })?;
+        let ((width, height), most) = (size, gpu.limits.max_texture_dimension_2d);
         if width.max(height) > most {
             return Err(Error::new(format!(
                 "a window of {width}x{height} pixels cannot be drawn: {} draws at most {most} a side",
                 gpu.facts().name
             )));
         }
-        let canvas = Canvas::new(gpu, shot.size, TextureCopies::default());
+        let canvas = Canvas::new(gpu, size, TextureCopies::default());
         let screen = Screen::new(&canvas.gpu, FORMAT)?;
         let context = egui::Context::default();
         let (sender, news) = channel();
@@ -67,18 +60,18 @@ impl Studio {
             // The screenshot may have been taken meanwhile.
             let _ = sender.send(());
         });
-        let start = Start { is_repeatable: true, ..shot.start };
+        let start = Start { is_repeatable: true, ..start };
         let wakes = Wakes { draw: wake.clone(), relay: wake };
         let loader = Loader::start(&start.document, start.of_scene.clone(), wakes.draw.clone());
         let app = App::new(start, loader, screen, &context, wakes)?;
-        let deadline = Instant::now() + shot.patience;
+        let deadline = Instant::now() + patience;
         Ok(Self {
             app,
             context,
             canvas,
             news,
             deadline,
-            patience: shot.patience,
+            patience,
             time: 0.0,
             pixels_per_point: 1.0,
         })
@@ -162,7 +155,9 @@ impl Studio {
         }
         // Opening a panel may have changed the viewport.
         self.settle()?;
-        self.canvas.read()
+        let Canvas { gpu, target, .. } = &self.canvas;
+        gpu.read_texture(target)
+            .map_err(|e| Error::new(format!("the drawn window cannot be read back: {e}")))
     }
 
     /// Whether the CPU is to render.
@@ -216,12 +211,6 @@ impl Studio {
     }
 }
 
-fn open(adapter: Option<&str>) -> Result<Gpu> {
-    Gpu::open(adapter).map_err(|e| {
-        Error::new(format!("there is no graphics device to draw the window with: {e}"))
-    })
-}
-
 /// Of the texture that stands for the window.
 const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
@@ -273,34 +262,25 @@ impl Canvas {
             renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let view = self.target.create_view(&wgpu::TextureViewDescriptor::default());
         let [r, g, b, a] = theme::PANEL.to_normalized_gamma_f32().map(f64::from);
-        {
-            let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("window"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..wgpu::RenderPassDescriptor::default()
-            });
-            renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
-        }
+        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("window"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
         commands.push(encoder.finish());
         queue.submit(commands);
         for id in &output.textures_delta.free {
             renderer.free_texture(id);
         }
         output.textures_delta.clear();
-    }
-
-    /// What was drawn last.
-    fn read(&self) -> Result<Rgb8> {
-        self.gpu
-            .read_texture(&self.target)
-            .map_err(|e| Error::new(format!("the drawn window cannot be read back: {e}")))
     }
 }

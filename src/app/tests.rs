@@ -16,7 +16,7 @@ use super::interface::{Dock, Interface, Tab};
 use super::loader::{Loaded, Loader};
 use super::overlays::{Legend, Overlay};
 use super::reload::Reload;
-use super::screenshot::{Shot, Studio};
+use super::screenshot::Studio;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
@@ -42,8 +42,7 @@ fn studio_of(scene: &str, size: (u32, u32)) -> Option<Studio> {
         ..defaults
     };
     let start = Start { document, ..Start::default() };
-    let shot = Shot { start, size, patience: Duration::from_secs(3000) };
-    let studio = Studio::open(shot);
+    let studio = Studio::open(start, size, Duration::from_secs(3000));
     let studio = studio.inspect_err(|error| crate::terminal::notice(format!("SKIPPED: {error}")));
     studio.ok()
 }

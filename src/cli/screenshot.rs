@@ -13,7 +13,7 @@ use crate::app::Start;
 use crate::app::document::{Document, Light, Look};
 use crate::app::interface::{Dock, Interface, Tab, TileView};
 use crate::app::overlays::Overlay;
-use crate::app::screenshot::{Shot, Studio};
+use crate::app::screenshot::Studio;
 use crate::error::{Error, Result};
 use crate::image::write_png;
 use crate::output::Exposure;
@@ -178,19 +178,16 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         stop: StopRule { samples: Some(arguments.samples), ..StopRule::default() },
         ..defaults
     };
-    let mut studio = Studio::open(Shot {
-        start: Start {
-            document,
-            place: arguments.place.start_view()?,
-            interface: interface(arguments),
-            of_scene,
-            adapter: arguments.adapter.clone(),
-            ..Start::default()
-        },
-        size: arguments.size,
-        patience: Duration::from_secs_f64(arguments.patience.min(1e9)),
-    })?
-    .at_scale(arguments.scale);
+    let start = Start {
+        document,
+        place: arguments.place.start_view()?,
+        interface: interface(arguments),
+        of_scene,
+        adapter: arguments.adapter.clone(),
+        ..Start::default()
+    };
+    let patience = Duration::from_secs_f64(arguments.patience.min(1e9));
+    let mut studio = Studio::open(start, arguments.size, patience)?.at_scale(arguments.scale);
     if let Some(material) = &arguments.select {
         studio.choose_material(material)?;
     }

@@ -10,7 +10,7 @@ use lightgrid::app::Start;
 use lightgrid::app::document::{Document, Light, Look, PictureSize};
 use lightgrid::app::interface::{Dock, Interface, Tab, TileView};
 use lightgrid::app::overlays::Overlay;
-use lightgrid::app::screenshot::{Shot, Studio};
+use lightgrid::app::screenshot::Studio;
 use lightgrid::image::{Rgb8, read_picture, write_png};
 use lightgrid::render::StopRule;
 use lightgrid::render::gpu::DeviceChoice;
@@ -36,8 +36,7 @@ fn start() -> Start {
 }
 
 fn studio(start: Start, size: (u32, u32)) -> Option<Studio> {
-    let shot = Shot { start, size, patience: Duration::from_secs(3000) };
-    match Studio::open(shot) {
+    match Studio::open(start, size, Duration::from_secs(3000)) {
         Ok(studio) => Some(studio),
         Err(error) => {
             eprintln!("SKIPPED: {error}");
