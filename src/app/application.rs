@@ -101,11 +101,8 @@ impl App {
         let mut history = History::new(start.of_scene);
         if let Some(folder) = start.pictures {
             let report = tasks.reporter();
-            let album = Album::open(folder, move |found| {
-                let failed = |error: Error| TaskResult::Failed(error.to_string());
-                report(found.map_or_else(failed, TaskResult::KeptPictures));
-            })?;
-            history.album = Some(album);
+            let report = move |found: Result<_>| report(found.map(TaskResult::KeptPictures));
+            history.album = Some(Album::open(folder, report)?);
         }
         let small_maps = SmallMaps::new(start.small_maps);
         let read = small_maps.read(start.settings.recent_maps.clone());
@@ -183,7 +180,13 @@ impl App {
     /// files and viewpoints, and at the end what was set.
     pub fn settings(&mut self, found: Option<Settings>, is_end: bool) -> Settings {
         let Edited { document, start, .. } = &self.edited;
-        let mut settings = self.library.take_settings(found, document);
+        let Library { settings: now, written, .. } = &mut self.library;
+        let mut settings = found.unwrap_or_else(|| written.clone());
+        let mut now = now.clone();
+        now.keep_viewpoints(document);
+        settings.take_lists(written, &now);
+        // What is written now is what is changed from now on.
+        *written = now;
         if is_end {
             settings.remember(document, start, &self.interface);
         }
@@ -195,15 +198,12 @@ impl App {
             let Edited { document, undo, .. } = &mut self.edited;
             let is_on_gpu = self.rendering.is_on_gpu(document.light.device);
             panels::top::show(ui, document, &self.interface, undo, is_on_gpu, commands);
-            let shown = self.display.shown.as_ref();
             let status = panels::status::Status {
                 rendering: &self.rendering,
-                shown: shown.map(|shown| &*shown.order.snapshot),
-                loading: self.assets.loading().collect(),
-                overlay: self.interface.overlay,
-                magnification: self.interface.magnification(document.size),
-                pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
-                is_denoised: document.look.denoise,
+                shown: self.display.shown.as_deref(),
+                loading: self.assets.loading().next(),
+                document,
+                interface: &self.interface,
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status, commands);
@@ -265,17 +265,12 @@ impl App {
 
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) -> egui::Rect {
         let document = &mut self.edited.document;
-        let settings = self.display.settings(document, &self.interface);
         let mut scope = panels::scope::Scope {
             scene: self.assets.scene_of(document),
             document,
             interface: &mut self.interface,
-            textures: &mut self.display.textures,
-            screen: &self.display.screen,
-            shown: self.display.shown.as_deref(),
-            settings,
-            snapshot: self.rendering.snapshot.as_deref(),
-            speed_up: self.rendering.speed_up,
+            display: &mut self.display,
+            rendering: &self.rendering,
             loading: self.assets.loading().next().is_some(),
             commands,
         };

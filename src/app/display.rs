@@ -6,15 +6,27 @@ use super::comparison::Comparison;
 use super::document::Document;
 use super::interface::Interface;
 use super::overlays::Overlay;
-use super::panels::scope::Textures;
 use super::presenter::{Order, Presenter, Shown};
-use super::screen::Screen;
-use super::threads::Wake;
+use super::screen::{Developed, Screen};
+use super::threads::{Wake, lock};
 use super::worker::{Request, Snapshot};
 use crate::develop::DevelopSettings;
 use crate::environment::sun::Sun;
 use crate::error::Result;
 use crate::image::Rgb8;
+use crate::scene::Camera;
+
+/// Developed pictures.
+#[derive(Default)]
+pub(super) struct Textures {
+    /// The last whole picture.
+    pub(super) main: Option<Developed>,
+    /// What it is of, unless it is a kept one: the geometry, and from where.
+    pub(super) main_of: Option<(Arc<()>, Camera)>,
+    /// A part of it that is rendered alone.
+    pub(super) part: Option<Developed>,
+    pub(super) other: Option<Developed>,
+}
 
 /// The presenting thread and its results, on a device.
 pub(super) struct Display {
@@ -44,7 +56,7 @@ impl Display {
         // What is on a device that was lost cannot be drawn.
         let is_here =
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
-        self.shown = self.presenter.shown().filter(is_here);
+        self.shown = lock(&self.presenter.shown).clone().filter(is_here);
     }
 
     /// The aspect before over the one of now, if another whole picture is shown since this was asked last.
@@ -90,7 +102,7 @@ impl Display {
 
     /// Whether what was ordered last is shown: what is ready since [`Self::collect`] is not.
     pub(super) fn is_settled(&self) -> bool {
-        self.presenter.has_made(self.shown.as_deref())
+        self.shown.as_ref().map(|shown| &shown.order) == self.presenter.ordered.as_ref()
     }
 
     /// Stops in all, once the automatic ones are known.
@@ -122,8 +134,10 @@ impl Display {
 
     /// The picture as it is on the screen, overlay included, if there is one.
     pub(super) fn read(&self) -> Option<Result<Rgb8>> {
-        let developed = self.textures.picture(self.shown.as_deref())?;
-        Some(self.screen.developer.read(&developed.display))
+        let Textures { main, part, .. } = &self.textures;
+        let is_part = self.shown.as_ref()?.order.snapshot.request.view.crop.is_some();
+        let developed = if is_part { part } else { main };
+        Some(self.screen.developer.read(&developed.as_ref()?.display))
     }
 
     /// Goes on with another device.

@@ -12,13 +12,14 @@ pub(super) struct Library {
     /// Recent files, viewpoints and folders as they are now.
     pub(super) settings: Settings,
     /// As they were when they were written last.
-    written: Settings,
+    pub(super) written: Settings,
     /// Kept pictures.
     pub(super) history: History,
     /// Small pictures of maps.
     pub(super) small_maps: SmallMaps,
-    /// Whether something came that is to be written at once.
-    has_news: bool,
+    /// Whether viewpoints or files have come that are to be written at once: nobody knows whether there will be time for
+    /// it at the end.
+    pub(super) has_news: bool,
 }
 
 impl Library {
@@ -78,27 +79,5 @@ impl Library {
             document.bookmarks.remove(index);
             self.has_news = true;
         }
-    }
-
-    /// Whether viewpoints or files have come that are to be written, since this was asked last: nobody knows whether
-    /// there will be time for it at the end.
-    pub(super) fn take_news(&mut self) -> bool {
-        std::mem::take(&mut self.has_news)
-    }
-
-    /// The settings to be written over what the file holds by now, if that is understood: lists of files and
-    /// viewpoints.
-    pub(super) fn take_settings(
-        &mut self,
-        found: Option<Settings>,
-        document: &Document,
-    ) -> Settings {
-        let mut found = found.unwrap_or_else(|| self.written.clone());
-        let mut settings = self.settings.clone();
-        settings.keep_viewpoints(document);
-        found.take_lists(&self.written, &settings);
-        // What is written now is what is changed from now on.
-        self.written = settings;
-        found
     }
 }

@@ -57,19 +57,7 @@ pub(super) struct Recipe {
     pub(super) overlay: Option<OverlayTexture>,
     pub(super) settings: DevelopSettings,
     /// Number of the snapshot it is of, where the picture changes by itself.
-    number: Option<u64>,
-}
-
-impl Recipe {
-    pub(super) fn new(
-        picture: &LinearPicture,
-        overlay: Option<&OverlayTexture>,
-        settings: DevelopSettings,
-        number: u64,
-    ) -> Self {
-        let number = picture.is_live.then_some(number);
-        Self { picture: picture.clone(), overlay: overlay.cloned(), settings, number }
-    }
+    pub(super) number: Option<u64>,
 }
 
 /// A developed picture that can be drawn.

@@ -45,12 +45,13 @@ impl Tasks {
         Self { sender, receiver, wake, writing: Vec::new() }
     }
 
-    /// A function that other threads report a result by.
-    pub(super) fn reporter(&self) -> impl Fn(TaskResult) + Send + 'static + use<> {
+    /// A function that other threads report a result by. A failure is one, too.
+    pub(super) fn reporter(&self) -> impl Fn(Result<TaskResult>) + Send + 'static + use<> {
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         move |result| {
+            let failed = |error: crate::error::Error| TaskResult::Failed(error.to_string());
             // The window may have gone meanwhile.
-            let _ = sender.send(result);
+            let _ = sender.send(result.unwrap_or_else(failed));
             wake();
         }
     }
@@ -62,9 +63,8 @@ impl Tasks {
         work: impl FnOnce() -> Result<TaskResult> + Send + 'static,
     ) -> Option<JoinHandle<()>> {
         let [report, refuse] = [(); 2].map(|()| self.reporter());
-        let failed = |error: crate::error::Error| TaskResult::Failed(error.to_string());
-        let thread = spawn(name, move || report(work().unwrap_or_else(failed)));
-        thread.map_err(|error| refuse(failed(error))).ok()
+        let thread = spawn(name, move || report(work()));
+        thread.map_err(|error| refuse(Err(error))).ok()
     }
 
     /// The same for a file that is written: the end of the window waits for it.

@@ -317,12 +317,7 @@ pub(super) fn clock(seconds: f64) -> String {
     }
 }
 
-/// Text on a dark plate.
-pub(in crate::app) fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
-    badges(ui, &[(at, align, text, color)]);
-}
-
-/// Several of them; one that would cover another is moved below it.
+/// Texts on dark plates; one that would cover another is moved below it.
 pub(in crate::app) fn badges(ui: &Ui, badges: &[(Pos2, Align2, &str, Color32)]) {
     let mut taken: Vec<Rect> = Vec::new();
     for (at, align, text, color) in badges {

@@ -44,7 +44,7 @@ fn show_hint(ui: &Ui, over: Rect, hint: &str) {
     ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
     let seen = over.intersect(ui.max_rect());
     let top = Pos2::new(seen.center().x, seen.top() + 14.0);
-    theme::badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+    theme::badges(ui, &[(top, Align2::CENTER_TOP, hint, theme::ACCENT)]);
 }
 
 /// Lets the sun follow the pointer while a button is held.
@@ -85,7 +85,7 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
 
 /// Where the pointer is, and what a click does there.
 fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scope<'_>) {
-    if scope.shown.is_some_and(|shown| shown.order.covers_now()) {
+    if scope.display.shown.as_ref().is_some_and(|shown| shown.order.covers_now()) {
         // A kept picture has colours and no more.
         scope.interface.pointed = None;
         return;
@@ -155,7 +155,11 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
     }
     let may_fly = !context.text_edit_focused() && !scope.interface.is_modal();
     hold_keys(context, may_fly, &mut scope.interface.flying);
-    let speed = scope.scene.map_or(1.0, |scene| flying_speed(&scene.world));
+    // Metres per second that suit the scene: a walk in a room, faster outdoors.
+    let speed = scope.scene.map_or(1.0, |scene| {
+        let (low, high) = scene.world.bvh.bounds();
+        (0.25 * (high - low).length()).clamp(0.05, 50.0)
+    });
     if let Some(metres) = flight(context, &scope.interface.flying, speed) {
         moved = true;
         viewpoint.fly(metres);
@@ -174,7 +178,7 @@ fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
 /// The surface under a click.
 fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
     let place = place_of(rect, response.interact_pointer_pos()?);
-    let (scene, snapshot) = (scope.scene?, &scope.shown?.order.snapshot);
+    let (scene, snapshot) = (scope.scene?, &scope.display.shown.as_ref()?.order.snapshot);
     let world = &snapshot.request.world;
     // The last picture of another scene says nothing about this one.
     let is_of_scene = Arc::ptr_eq(&world.geometry, &scene.world.geometry);
@@ -189,12 +193,6 @@ fn pick(rect: Rect, response: &Response, scope: &mut Scope<'_>, act: fn(&mut Vie
         act(&mut moved, spot.position);
         scope.commands.push(Command::LookFrom(moved));
     }
-}
-
-/// Metres per second that suit the scene: a walk in a room, faster outdoors.
-fn flying_speed(world: &crate::path::World) -> f32 {
-    let (low, high) = world.bvh.bounds();
-    (0.25 * (high - low).length()).clamp(0.05, 50.0)
 }
 
 /// Keys that fly: right, left, up, down, forward, back.

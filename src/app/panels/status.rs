@@ -5,8 +5,11 @@ use std::time::Duration;
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
 use crate::app::commands::Command;
+use crate::app::document::Document;
+use crate::app::interface::Interface;
 use crate::app::loader::Loading;
 use crate::app::overlays::{Overlay, value_text};
+use crate::app::presenter::Shown;
 use crate::app::rendering::Rendering;
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
@@ -15,19 +18,13 @@ use crate::app::worker::{Activity, Snapshot};
 pub(in crate::app) struct Status<'a> {
     /// The worker and its latest picture.
     pub(in crate::app) rendering: &'a Rendering,
-    /// That of the picture on the screen.
-    pub(in crate::app) shown: Option<&'a Snapshot>,
-    /// Files being loaded.
-    pub(in crate::app) loading: Vec<Loading<'a>>,
-    /// What is drawn over it.
-    pub(in crate::app) overlay: Option<Overlay>,
-    /// Pixels of the screen for one of the picture, where it is magnified.
-    pub(in crate::app) magnification: Option<f32>,
-    /// Place of the picture under the pointer, both coordinates in `[0,1]`.
-    pub(in crate::app) pointed: Option<glam::Vec2>,
-    /// Whether what is shown is without noise.
-    pub(in crate::app) is_denoised: bool,
-    /// Figures that depend on the clock are left out.
+    /// What is on the screen.
+    pub(in crate::app) shown: Option<&'a Shown>,
+    /// A file being loaded.
+    pub(in crate::app) loading: Option<Loading<'a>>,
+    pub(in crate::app) document: &'a Document,
+    pub(in crate::app) interface: &'a Interface,
+    /// Figures that depend on the clock are left out, and those of what is pointed at.
     pub(in crate::app) hides_clock: bool,
 }
 
@@ -56,13 +53,14 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(snapshot) = &status.rendering.snapshot {
-                    let pointed = status.pointed.zip(status.shown);
+                    let pointed = status.interface.pointed.filter(|_| !status.hides_clock);
+                    let pointed = pointed.zip(status.shown);
                     // Where there is room for one, what is pointed at comes first.
                     if pointed.is_none() || !theme::is_narrow(ui) {
                         device(ui, snapshot, status);
                     }
                     if let Some((place, shown)) = pointed {
-                        pixel(ui, shown, place, status.overlay);
+                        pixel(ui, &shown.order.snapshot, place, status.interface.overlay);
                     }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -78,7 +76,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<
 }
 
 fn phase(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
-    if let Some(loading) = status.loading.first() {
+    if let Some(loading) = &status.loading {
         let name = theme::file_name(loading.name);
         let text = match loading.seconds < MIN_LOADING_SECONDS || status.hides_clock {
             true => format!("Loading {name}…"),
@@ -132,7 +130,7 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
 fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
     let session = &snapshot.main;
     if matches!(snapshot.activity, Activity::Rendering | Activity::Paused | Activity::Done) {
-        let (error, column, of) = match status.is_denoised {
+        let (error, column, of) = match status.document.look.denoise {
             true => (snapshot.errors.map(|errors| errors.left()), 0, "areas of 16 pixels"),
             false => (Some(session.noise as f32), 1, "a pixel"),
         };
@@ -193,18 +191,13 @@ fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
     .on_hover_text(hint);
 }
 
-/// Pixels across and down of the picture being made.
-fn size(snapshot: &Snapshot) -> [u32; 2] {
-    let film = &snapshot.main.film;
-    match snapshot.activity {
-        Activity::Moving => [film.width, film.height],
-        _ => [snapshot.request.view.width, snapshot.request.view.height],
-    }
-}
-
 fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
     let threads = status.rendering.worker.threads();
-    let [width, height] = size(snapshot);
+    let (film, view) = (&snapshot.main.film, &snapshot.request.view);
+    let (width, height) = match snapshot.activity {
+        Activity::Moving => (film.width, film.height),
+        _ => (view.width, view.height),
+    };
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {
             let adapter = &gpu.adapter;
@@ -231,7 +224,7 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
             )
         }
     };
-    let zoomed = status.magnification.map(|times| format!(" at {:.0} %", 100.0 * times));
-    let zoomed = zoomed.unwrap_or_default();
+    let zoomed = status.interface.magnification(status.document.size);
+    let zoomed = zoomed.map_or_else(String::new, |times| format!(" at {:.0} %", 100.0 * times));
     ui.label(theme::quiet(format!("{width} x {height}{zoomed}  ·  {name}"))).on_hover_text(hint);
 }

@@ -10,6 +10,7 @@ use egui::{
 use super::gestures;
 use super::scope::Scope;
 use crate::app::comparison::AMPLIFIED;
+use crate::app::display::Display;
 use crate::app::drag::{Drag, Step};
 use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
@@ -28,7 +29,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let scale = ui.ctx().pixels_per_point();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
-        let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
+        let settings = scope.display.settings(scope.document, scope.interface);
+        let shown = scope.display.shown.clone();
+        let Some((shown, settings)) = shown.as_deref().zip(settings) else {
             ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
             waiting(ui, area, scope.loading);
             return;
@@ -46,7 +49,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         if let Some(other) = &shown.other {
             handle = beside(ui, &places, (shown, other), settings, scope);
         } else {
-            scope.textures.other = None;
+            scope.display.textures.other = None;
             if let Some(compared) = compared.filter(|compared| compared.is_difference) {
                 difference_label(ui, seen, &compared.names, shown.difference);
             }
@@ -68,13 +71,18 @@ struct Places {
     whole: Rect,
     /// What is shown.
     rect: Rect,
-    zoomed: Zoomed,
+    /// Where the whole would fit.
+    fitting: Rect,
+    zoom: Zoom,
+    /// Moves the magnified picture's corner onto one of the screen's pixels.
+    shift: Vec2,
 }
 
 impl Places {
     /// Of what is shown in a room; the interface is told how large that would fit.
     fn of((area, scale): (Rect, f32), shown: &Shown, scope: &mut Scope<'_>) -> Self {
-        let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
+        let snapshot = scope.rendering.snapshot.as_ref().unwrap_or(&shown.order.snapshot);
+        let view = &snapshot.request.view;
         let (fitting, rect) = match &shown.order.compared {
             // A kept picture may be of another shape, or of a part.
             Some(compared) => kept_rects((area, scale), shown.picture.size(), compared.regions[1]),
@@ -92,26 +100,13 @@ impl Places {
         let zoom = scope.interface.zoom;
         let corner = zoom.of(area, fitting, fitting).min.to_vec2() * scale;
         let shift = if zoom.is_some() { (corner.round() - corner) / scale } else { Vec2::ZERO };
-        let zoomed = Zoomed { area, fitting, zoom, shift };
-        let (whole, rect) = (zoomed.of(fitting), zoomed.of(rect));
-        Self { room: (area, scale), whole, rect, zoomed }
+        let fits = Self { room: (area, scale), whole: fitting, rect, fitting, zoom, shift };
+        Self { whole: fits.zoomed(fitting), rect: fits.zoomed(rect), ..fits }
     }
-}
 
-/// How the picture is magnified.
-struct Zoomed {
-    area: Rect,
-    /// Where the whole would fit.
-    fitting: Rect,
-    zoom: Zoom,
-    /// Moves the magnified picture's corner onto one of the screen's pixels.
-    shift: Vec2,
-}
-
-impl Zoomed {
     /// Where something lies that would lie here if all fitted.
-    fn of(&self, rect: Rect) -> Rect {
-        self.zoom.of(self.area, self.fitting, rect).translate(self.shift)
+    fn zoomed(&self, rect: Rect) -> Rect {
+        self.zoom.of(self.room.0, self.fitting, rect).translate(self.shift)
     }
 }
 
@@ -124,19 +119,21 @@ fn beside(
     settings: DevelopSettings,
     scope: &mut Scope<'_>,
 ) -> Rect {
-    let recipe = Recipe::new(other, None, settings, shown.order.snapshot.number);
+    let number = other.is_live.then_some(shown.order.snapshot.number);
+    let recipe = Recipe { picture: other.clone(), overlay: None, settings, number };
     let changes = changes(ui, other, scope);
-    let source = Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
+    let Display { textures, screen, .. } = &mut *scope.display;
+    let source = Developed::update(&mut textures.other, screen, recipe, changes);
     let seen = places.rect.intersect(places.room.0);
     let compared = shown.order.compared.as_ref();
     let of_left = compared.map_or(places.rect, |compared| {
         let (of_whole, part) = kept_rects(places.room, other.size(), compared.regions[0]);
-        if !is_alike(of_whole, places.zoomed.fitting) {
+        if !is_alike(of_whole, places.fitting) {
             // Beside another shape nothing is to be seen of what lies under it.
             let hidden = left_of(seen, seen, scope.interface.wipe);
             ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
         }
-        places.zoomed.of(part)
+        places.zoomed(part)
     });
     let has_squares = has_squares(other, shown, scope);
     let shape = source.shape(of_left, has_squares);
@@ -153,7 +150,7 @@ fn difference_label(ui: &Ui, seen: Rect, [left, right]: &[String; 2], apart: Opt
     let percent = apart.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart)).unwrap_or_default();
     let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
     let at = Pos2::new(seen.center().x, seen.top() + 14.0);
-    theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
+    theme::badges(ui, &[(at, Align2::CENTER_TOP, &text, theme::TEXT)]);
 }
 
 /// Fills what the picture leaves of its room, and no more: software is slow to fill.
@@ -201,7 +198,7 @@ fn measure(ui: &Ui, area: Rect, scope: &mut Scope<'_>) {
     let points = ui.ctx().pixels_per_point();
     let pixels = |size: Vec2| [size.x, size.y].map(|side| (side * points).round().max(1.0) as u32);
     let window = Some((pixels(ui.ctx().content_rect().size()), scope.interface.panels));
-    if scope.interface.viewport_of != window || scope.shown.is_none() {
+    if scope.interface.viewport_of != window || scope.display.shown.is_none() {
         scope.interface.viewport_of = window;
         scope.interface.viewport_pixels = Some(pixels(area.size()));
     }
@@ -273,33 +270,34 @@ fn picture(
 ) {
     let painter = ui.painter();
     let has_squares = has_squares(&shown.picture, shown, scope);
-    let number = shown.order.snapshot.number;
-    let overlay = shown.painted.as_ref().map(|painted| &painted.colors);
-    let recipe = Recipe::new(&shown.picture, overlay, settings, number);
+    let number = shown.picture.is_live.then_some(shown.order.snapshot.number);
+    let overlay = shown.painted.as_ref().map(|painted| painted.colors.clone());
+    let recipe = Recipe { picture: shown.picture.clone(), overlay, settings, number };
     let changes = changes(ui, &shown.picture, scope);
     let request = &shown.order.snapshot.request;
     let latest = shown.order.latest();
     let of = (Arc::clone(&latest.world.geometry), latest.view.camera.clone());
+    let Display { textures, screen, .. } = &mut *scope.display;
     if request.view.crop.is_none() {
-        scope.textures.main_of = (!shown.order.covers_now()).then_some(of);
-        let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
+        textures.main_of = (!shown.order.covers_now()).then_some(of);
+        let source = Developed::update(&mut textures.main, screen, recipe, changes);
         ui.painter_at(whole).add(source.shape(rect, has_squares));
-        scope.textures.part = None;
+        textures.part = None;
         return;
     }
-    scope.textures.main.take_if(|_| {
-        let main_of = scope.textures.main_of.as_ref();
+    textures.main.take_if(|_| {
+        let main_of = textures.main_of.as_ref();
         main_of.is_none_or(|main_of| !Arc::ptr_eq(&main_of.0, &of.0) || !main_of.1.sees_like(&of.1))
     });
     let is_left = scope.document.region.is_none();
-    if let Some(main) = &scope.textures.main {
+    if let Some(main) = &textures.main {
         let rect = middle_rect(whole, main.display.size());
         ui.painter_at(whole).add(main.source.shape(rect, has_squares));
         if !is_left {
             painter.rect_filled(whole, 0.0, Color32::from_black_alpha(165));
         }
     }
-    let source = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
+    let source = Developed::update(&mut textures.part, screen, recipe, changes);
     painter.add(source.shape(rect, has_squares));
     if !is_left {
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
@@ -319,8 +317,8 @@ fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
     let is_idle =
         |snapshot: &Snapshot| matches!(snapshot.activity, Activity::Paused | Activity::Done);
     let changes = picture.is_live
-        && !scope.screen.gpu().facts().is_software()
-        && !scope.snapshot.is_none_or(is_idle);
+        && !scope.display.screen.gpu().facts().is_software()
+        && !scope.rendering.snapshot.as_deref().is_none_or(is_idle);
     if changes {
         ui.ctx().request_repaint();
     }
@@ -391,7 +389,7 @@ fn wipe_labels(ui: &Ui, rect: Rect, [left, right]: &[String; 2], middle: Option<
 
 /// How far the plain method and the chosen one have come.
 fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
-    let Some(snapshot) = scope.snapshot else { return };
+    let Some(snapshot) = &scope.rendering.snapshot else { return };
     let label = |name: &str, take: &SessionSnapshot| {
         let (samples, noise) = (theme::samples(take.mean_samples()), 100.0 * take.noise);
         let noise = if noise.is_finite() { format!(", noise {noise:.1} %") } else { String::new() };
@@ -399,7 +397,7 @@ fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     };
     let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| label("plain", plain));
     let name = crate::app::convergence::name_of(snapshot.main.sampling);
-    let speed_up = scope.speed_up.as_ref().map(|speed_up| {
+    let speed_up = scope.rendering.speed_up.as_ref().map(|speed_up| {
         format!(
             "{:.2} × as fast ({:.2} to {:.2})",
             speed_up.ratio,

@@ -16,10 +16,11 @@ use std::time::{Duration, Instant};
 
 use memory::Memory;
 pub(crate) use order::{Order, Shown};
-use rest::{MOVING_REST, Work, rest_after};
+use rest::{MOVING_REST, rest_after, took};
 
 use super::threads::{Latest, LatestThread, Wake, lock};
 use crate::error::{Error, Result};
+use crate::system::{return_freed, thread_cpu_time};
 
 /// No picture takes longer to be made ready.
 const MAX_WAIT: Duration = Duration::from_secs(60);
@@ -30,8 +31,10 @@ const RETURN: Duration = Duration::from_secs(10);
 /// The handle of the presenting thread; it ends when dropped.
 pub(crate) struct Presenter {
     thread: LatestThread<Order>,
-    shown: Arc<Mutex<Option<Arc<Shown>>>>,
-    ordered: Option<Order>,
+    /// What there is to show.
+    pub(super) shown: Arc<Mutex<Option<Arc<Shown>>>>,
+    /// What was ordered last.
+    pub(super) ordered: Option<Order>,
     /// Set where the picture that is being made is no longer of what is asked for.
     cancel: Arc<AtomicBool>,
 }
@@ -69,17 +72,6 @@ impl Presenter {
             slot.value = Some(order);
         });
     }
-
-    /// What there is to show.
-    pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
-        lock(&self.shown).clone()
-    }
-
-    /// Whether this is what was ordered last.
-    pub(crate) fn has_made(&self, shown: Option<&Shown>) -> bool {
-        shown.is_none_or(|shown| !shown.is_coarse)
-            && shown.map(|shown| &shown.order) == self.ordered.as_ref()
-    }
 }
 
 fn run(
@@ -113,7 +105,7 @@ fn run(
     };
     while let Some(order) = next(last.as_ref()) {
         let (start, kept) = (Instant::now(), order.presented());
-        let work = Work::start();
+        let worked = thread_cpu_time();
         order.snapshot.rest.set_end(start + MAX_WAIT);
         match catch_unwind(AssertUnwindSafe(|| memory.present(&order, cancel))) {
             Ok(Ok(Some(done))) => {
@@ -127,7 +119,7 @@ fn run(
             // The panic is on the terminal; the next picture is another try.
             Err(_) => memory = Memory::default(),
         }
-        let took = work.time(start.elapsed());
+        let took = took(worked, start.elapsed());
         let rest = match kept.snapshot.request.moving {
             true => took.mul_f64(MOVING_REST),
             false => rest_after(took, kept.snapshot.youngest_seconds()),
@@ -137,7 +129,7 @@ fn run(
         last = Some((kept, end));
         wake();
         if returned.elapsed() > RETURN {
-            crate::system::return_freed();
+            return_freed();
             returned = Instant::now();
         }
     }

@@ -19,21 +19,13 @@ pub(super) fn rest_after(took: Duration, seconds: f64) -> Duration {
     took.mul_f64(least + (most - least) * slowed)
 }
 
-/// What a picture took, for its rest. By the clock that would be far too long where other programs take the
+/// What a picture took, for its rest, of so much by the clock; `start` is this thread's time at work when it was begun.
+/// By the clock that would be far too long where other programs take the
 /// cores (a picture stood still for half a minute), by this thread's time at work far too short for the
 /// renderer, which gets as little: it is the geometric mean of both.
-pub(super) struct Work(Option<Duration>);
-
-impl Work {
-    pub(super) fn start() -> Self {
-        Self(thread_cpu_time())
-    }
-
-    /// What it took, of so much by the clock.
-    pub(super) fn time(&self, elapsed: Duration) -> Duration {
-        let worked = thread_cpu_time().zip(self.0).map(|(now, start)| now.saturating_sub(start));
-        worked.map_or(elapsed, |worked| between(worked.min(elapsed), elapsed))
-    }
+pub(super) fn took(start: Option<Duration>, elapsed: Duration) -> Duration {
+    let worked = thread_cpu_time().zip(start).map(|(now, start)| now.saturating_sub(start));
+    worked.map_or(elapsed, |worked| between(worked.min(elapsed), elapsed))
 }
 
 fn between(worked: Duration, elapsed: Duration) -> Duration {
