@@ -102,7 +102,8 @@ impl Display {
 
     /// Whether what was ordered last is shown: what is ready since [`Self::collect`] is not.
     pub(super) fn is_settled(&self) -> bool {
-        self.shown.as_ref().map(|shown| &shown.order) == self.presenter.ordered.as_ref()
+        self.shown.as_ref().is_none_or(|shown| !shown.is_coarse)
+            && self.shown.as_ref().map(|shown| &shown.order) == self.presenter.ordered.as_ref()
     }
 
     /// Stops in all, once the automatic ones are known.

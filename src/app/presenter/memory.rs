@@ -146,8 +146,9 @@ impl Memory {
             return Ok(None);
         }
         let prepare = || match self.recent.come_back(order) {
-            Some((image, is_carried)) => {
-                Ok(Some(Prepared { is_carried, ..Prepared::of(&developer, image) }))
+            Some(kept) => {
+                let prepared = Prepared::of(&developer, Arc::clone(&kept.image));
+                Ok(Some(Prepared { is_carried: kept.is_carried, ..prepared }))
             }
             None => Ok(source.prepare(&developer, cancel)),
         };
@@ -226,7 +227,8 @@ impl Memory {
             return None;
         }
         let carried = || Some((Arc::new(self.carried.ahead(order)?), self.automatic_ev));
-        self.recent.ahead(order).or_else(carried)
+        let kept = self.recent.ahead(order);
+        kept.map(|kept| (Arc::clone(&kept.image), kept.automatic_ev)).or_else(carried)
     }
 
     /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or

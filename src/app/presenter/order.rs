@@ -75,7 +75,7 @@ impl Order {
 
     /// Whether what is kept is shown where the picture that is rendered would be.
     pub(in crate::app) fn covers_now(&self) -> bool {
-        self.compared.as_ref().is_some_and(Comparison::covers_now)
+        self.compared.as_ref().is_some_and(|it| it.is_difference || it.right.is_some())
     }
 
     /// What is to be shown, made on the host.

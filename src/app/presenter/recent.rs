@@ -16,12 +16,12 @@ const COUNT: usize = 3;
 pub(super) struct Recent(VecDeque<Picture>);
 
 /// A picture that was shown.
-struct Picture {
+pub(super) struct Picture {
     request: Arc<Request>,
     denoiser: Option<Denoiser>,
-    image: Arc<Image>,
-    is_carried: bool,
-    automatic_ev: f32,
+    pub(super) image: Arc<Image>,
+    pub(super) is_carried: bool,
+    pub(super) automatic_ev: f32,
 }
 
 impl Recent {
@@ -42,17 +42,15 @@ impl Recent {
         self.0.truncate(COUNT);
     }
 
-    /// What was shown when an order's picture was left, if it is the first order since, and whether that was carried.
-    pub(super) fn come_back(&self, order: &Order) -> Option<(Arc<Image>, bool)> {
-        let request = &order.snapshot.request;
-        let kept = self.of(request, order.denoiser).filter(|_| order.snapshot.is_lasting())?;
-        Some((Arc::clone(&kept.image), kept.is_carried))
+    /// What was shown when an order's picture was left, if it is the first order since.
+    pub(super) fn come_back(&self, order: &Order) -> Option<&Picture> {
+        let request = Some(&order.snapshot.request).filter(|_| order.snapshot.is_lasting());
+        self.of(request?, order.denoiser)
     }
 
-    /// What was shown when the picture of the request ahead was left, and its automatic stops.
-    pub(super) fn ahead(&self, order: &Order) -> Option<(Arc<Image>, f32)> {
-        let kept = self.of(order.still_ahead()?, order.denoiser)?;
-        Some((Arc::clone(&kept.image), kept.automatic_ev))
+    /// What was shown when the picture of the request ahead was left.
+    pub(super) fn ahead(&self, order: &Order) -> Option<&Picture> {
+        self.of(order.still_ahead()?, order.denoiser)
     }
 
     fn of(&self, request: &Arc<Request>, denoiser: Option<Denoiser>) -> Option<&Picture> {
@@ -85,8 +83,8 @@ mod tests {
         recent.keep(&order(&left), &image, (true, 2.0));
         assert!(recent.come_back(&order(&left)).is_none(), "it goes on");
         let again = Arc::new((*left).clone());
-        let (found, is_carried) = recent.come_back(&order(&again)).expect("it is the same picture");
-        assert!(Arc::ptr_eq(&found, &image) && is_carried);
+        let found = recent.come_back(&order(&again)).expect("it is the same picture");
+        assert!(Arc::ptr_eq(&found.image, &image) && found.is_carried);
         // It is asked for, and not rendered yet.
         let mut elsewhere = (*left).clone();
         elsewhere.view.camera.world_from_camera.translation.x += 1.0;
@@ -94,8 +92,8 @@ mod tests {
             ahead: Some(Arc::clone(request)),
             ..order(&Arc::new(elsewhere.clone()))
         };
-        let (found, stops) = recent.ahead(&ahead(&again)).expect("it is asked for");
-        assert!(Arc::ptr_eq(&found, &image) && stops == 2.0);
+        let found = recent.ahead(&ahead(&again)).expect("it is asked for");
+        assert!(Arc::ptr_eq(&found.image, &image) && found.automatic_ev == 2.0);
         assert!(recent.ahead(&order(&again)).is_none(), "it is there");
         let moving = Arc::new(Request { moving: true, ..(*left).clone() });
         assert!(recent.ahead(&ahead(&moving)).is_none(), "the camera goes on");

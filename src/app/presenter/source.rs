@@ -50,25 +50,22 @@ pub(super) struct Source {
 }
 
 /// Tells sources apart: equal ones give the same picture. It keeps no film in memory.
-#[derive(Clone)]
+#[derive(Clone, PartialEq)]
 pub(super) struct SourceKey {
-    film: Weak<Film>,
-    backdrop: Option<(Weak<Film>, f32)>,
+    film: Same,
+    backdrop: Option<(Same, f32)>,
     denoiser: Option<Denoiser>,
     is_whole: bool,
     coarseness: u32,
 }
 
-impl PartialEq for SourceKey {
+/// The very same film.
+#[derive(Clone)]
+struct Same(Weak<Film>);
+
+impl PartialEq for Same {
     fn eq(&self, other: &Self) -> bool {
-        let is_alike = match (&self.backdrop, &other.backdrop) {
-            (Some((film, worth)), Some(other)) => film.ptr_eq(&other.0) && *worth == other.1,
-            (own, other) => own.is_none() && other.is_none(),
-        };
-        is_alike
-            && self.film.ptr_eq(&other.film)
-            && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
-            && self.coarseness == other.coarseness
+        self.0.ptr_eq(&other.0)
     }
 }
 
@@ -91,9 +88,10 @@ impl Source {
     }
 
     pub(super) fn key(&self) -> SourceKey {
-        let of_backdrop = |it: &Backdrop| (Arc::downgrade(&it.film), it.worth);
+        let same = |film: &Arc<Film>| Same(Arc::downgrade(film));
+        let of_backdrop = |it: &Backdrop| (same(&it.film), it.worth);
         SourceKey {
-            film: Arc::downgrade(&self.session.film),
+            film: same(&self.session.film),
             backdrop: self.backdrop.as_ref().map(of_backdrop),
             denoiser: self.denoiser,
             is_whole: self.is_whole,
