@@ -71,15 +71,14 @@ impl Settings {
     /// data; `None` if there is none.
     pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(DATA)?.join("pictures"));
-        let beside = |file: &Path| with_suffix(file, ".pictures");
-        file.map(beside).or_else(usual)
+        file.map(|file| file.with_added_extension("pictures")).or_else(usual)
     }
 
     /// Where small pictures of maps are: beside a settings file that was named, else under the user's folder for
     /// what can be made again; `None` if there is none.
     pub fn small_maps_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(CACHE)?.join("maps"));
-        file.map(|file| with_suffix(file, ".maps")).or_else(usual)
+        file.map(|file| file.with_added_extension("maps")).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -106,7 +105,7 @@ impl Settings {
             Ok(settings) => return (settings, None),
             Err(failure) => failure,
         };
-        let aside = with_suffix(path, ".bak");
+        let aside = path.with_added_extension("bak");
         let notice = match std::fs::copy(path, &aside) {
             Ok(_) => format!("{failure}; it is kept as {}", aside.display()),
             Err(error) => format!("{failure}; it cannot be kept aside: {error}"),
@@ -171,11 +170,6 @@ impl Settings {
             stop: self.stop,
             ..Document::default()
         }
-    }
-
-    /// The interface a new window starts from.
-    pub fn interface(&self) -> Interface {
-        Interface { tab: self.tab, dock: self.dock, ..Interface::default() }
     }
 
     /// Takes over what was changed in a window since it was opened with `start`: what the command line
@@ -281,13 +275,6 @@ pub(super) fn lasting_scene(name: &str) -> String {
 /// The same for a map.
 pub(super) fn lasting_map(name: &str) -> String {
     if sources::is_built_in_map(name) { name.to_owned() } else { lasting(name) }
-}
-
-/// The path of something beside a file.
-fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
-    let mut path = file.as_os_str().to_owned();
-    path.push(suffix);
-    path.into()
 }
 
 /// Kinds of the user's folders: the variable that names one and the one below the home folder where it is not set, that

@@ -7,6 +7,7 @@ use super::choices::SceneArguments;
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, PictureSize};
+use crate::app::interface::Interface;
 use crate::app::settings_file::Settings;
 use crate::app::window;
 use crate::error::Result;
@@ -81,7 +82,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let start = Start {
         document: Document { lamp_edits, ..document(arguments, &settings) },
         place: arguments.place.start_view()?,
-        interface: settings.interface(),
+        interface: Interface { tab: settings.tab, dock: settings.dock, ..Interface::default() },
         settings,
         of_scene,
         adapter: arguments.adapter.clone(),
@@ -112,12 +113,9 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
     let [scene, map] = arguments.names().map(str::to_owned);
     let bookmarks = settings.viewpoints_of(&scene);
     let mut document = Document { scene, map, bookmarks, ..settings.document() };
-    if let Some(sampling) = arguments.sampling {
-        document.light.sampling = sampling;
-    }
-    if let Some(device) = arguments.device {
-        document.light.device = device;
-    }
+    let light = &mut document.light;
+    light.sampling = arguments.sampling.unwrap_or(light.sampling);
+    light.device = arguments.device.unwrap_or(light.device);
     if let Some((width, height)) = arguments.size {
         document.size = PictureSize::Fixed(width, height);
     }
