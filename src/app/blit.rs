@@ -19,10 +19,8 @@ pub(super) struct Blit {
 impl Blit {
     /// Compiles it for frames of a format, encoded as sRGB or written as they are.
     pub(super) fn new(gpu: &Gpu, target: wgpu::TextureFormat) -> Self {
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("blit"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/blit.wgsl").into()),
-        });
+        let source = wgpu::include_wgsl!("../../shaders/blit.wgsl");
+        let module = gpu.device.create_shader_module(source);
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("blit"),
             layout: None,

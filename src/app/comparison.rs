@@ -71,11 +71,6 @@ impl Comparison {
         })
     }
 
-    /// Whether something else is shown where the picture that is rendered would be.
-    pub(super) fn covers_now(&self) -> bool {
-        self.is_difference || self.right.is_some()
-    }
-
     /// Makes it ready; `now` is the picture that is rendered.
     pub(super) fn prepare(
         &self,

@@ -40,17 +40,12 @@ impl Edited {
         self.undo.settle(&self.document);
     }
 
-    /// The document before the last step, if there is one.
-    pub(super) fn before(&mut self) -> Option<Document> {
+    /// The document before the last step or, if that `is_redo`, after the one that was taken back last; if there is
+    /// one.
+    pub(super) fn step(&mut self, is_redo: bool) -> Option<Document> {
         // What has just been changed may not have been noted as yet.
         self.settle();
-        self.undo.undo()
-    }
-
-    /// The document after the step that was taken back last, if there is one.
-    pub(super) fn after(&mut self) -> Option<Document> {
-        self.settle();
-        self.undo.redo()
+        if is_redo { self.undo.redo() } else { self.undo.undo() }
     }
 
     /// Changes the document by the program itself: that is no step.

@@ -117,9 +117,7 @@ impl App {
                 said.for_each(|sentence| self.messages.notice(sentence));
             }
             Command::Undo | Command::Redo => {
-                let is_undo = command == Command::Undo;
-                let found = if is_undo { self.edited.before() } else { self.edited.after() };
-                if let Some(document) = found {
+                if let Some(document) = self.edited.step(command == Command::Redo) {
                     self.go_to(document);
                 }
             }

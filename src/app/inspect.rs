@@ -93,8 +93,7 @@ impl Inspector {
 
     /// Forgets everything: another scene or map is shown, and what is known of the last one is large.
     pub(super) fn forget(&mut self) {
-        (self.inspected, self.source) = (None, None);
-        (self.environment, self.learned, self.truth) = (None, None, None);
+        *self = Self { busy: self.busy, ..Self::default() };
     }
 
     /// Takes a truth that is ready.

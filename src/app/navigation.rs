@@ -83,9 +83,7 @@ impl Viewpoint {
     /// viewport of `height` points.
     pub(super) fn pan(&mut self, drag: Vec2, height: f32) {
         let metres = 2.0 * self.half_extent() / height.max(1.0);
-        let rotation = self.rotation();
-        let step = rotation * Vec3::new(-drag.x * metres, drag.y * metres, 0.0);
-        self.eye = (self.eye() + step).to_array();
+        self.fly(Vec3::new(-drag.x * metres, drag.y * metres, 0.0));
     }
 
     /// Moves towards the pivot (positive `steps`) or away from it.

@@ -37,6 +37,7 @@ pub(super) struct SmallMapsFound {
 }
 
 /// Small pictures of maps on the device, by their lasting names.
+#[derive(Default)]
 pub(super) struct SmallMaps {
     folder: Option<PathBuf>,
     textures: BTreeMap<String, TextureHandle>,
@@ -51,13 +52,7 @@ pub(super) struct SmallMaps {
 impl SmallMaps {
     /// None yet; `folder` is where they are kept, if anywhere.
     pub(super) fn new(folder: Option<PathBuf>) -> Self {
-        Self {
-            folder,
-            textures: BTreeMap::new(),
-            listed: Vec::new(),
-            tried: BTreeSet::new(),
-            is_busy: false,
-        }
+        Self { folder, ..Self::default() }
     }
 
     /// Reads the pictures of maps that were opened lately, and makes those of built-in skies.

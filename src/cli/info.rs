@@ -81,10 +81,7 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
 
 fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
     let sun = Sun::of(map);
-    let left_out = match sun {
-        None => vec!["sampling of the map and the Light Grid: the map is black"],
-        Some(_) => Vec::new(),
-    };
+    let black = "sampling of the map and the Light Grid: the map is black";
     json!({
         "map": name,
         "notices": notices.iter().collect::<Vec<_>>(),
@@ -98,7 +95,7 @@ fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
             "elevation": sun.elevation_degrees,
         })),
         "energy_within_2.5_degrees_of_it": sun.map(|sun| sun.energy_share),
-        "left_out": left_out,
+        "left_out": sun.is_none().then_some(black).into_iter().collect::<Vec<_>>(),
     })
 }
 
@@ -110,19 +107,16 @@ fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
             "left_out" => "not needed, so left out of the program".to_owned(),
             key => key.replace('_', " "),
         };
+        let is_names = key.ends_with("_names");
         match value {
-            Value::Array(names) if key.ends_with("_names") => {
-                let names: Vec<String> = names.iter().map(number).collect();
-                lines.push(format!("{:indent$}{label}: {}", "", names.join(", ")));
-            }
-            Value::Array(texts) if texts.iter().any(Value::is_string) => {
+            Value::Array(texts) if !is_names && texts.iter().any(Value::is_string) => {
                 lines.push(format!("{:indent$}{label}:", ""));
                 for text in texts.iter().filter_map(Value::as_str) {
                     lines.push(format!("{:indent$}  - {}", "", one_line(text)));
                 }
             }
-            Value::Array(numbers) if !numbers.is_empty() => {
-                let texts: Vec<String> = numbers.iter().map(number).collect();
+            Value::Array(items) if is_names || !items.is_empty() => {
+                let texts: Vec<String> = items.iter().map(number).collect();
                 let separator = if key.starts_with("size") { " x " } else { ", " };
                 lines.push(format!("{:indent$}{label}: {}", "", texts.join(separator)));
             }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::render::gpu::adapters;
 use crate::render::{Gi, Sampling, Sharing};
 use crate::report::{
-    Device, Effort, Frame, Method, Options, Plan, Report, Row, ablations, check, duration, make,
+    Device, Effort, Frame, Method, Options, Plan, Row, ablations, check, duration, make,
     markdown_table, sat, talk,
 };
 use crate::scene::builtin;
@@ -145,7 +145,7 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<()> {
             report(&talk::plan(effort(arguments, all_devices), command), arguments)
         }
         Some(What::Ablations(arguments)) => {
-            let effort = effort(&arguments.effort, only_cpu);
+            let effort = effort(&arguments.effort, || vec![Device::Cpu]);
             let places = &arguments.places;
             let rows = if places.scenes.is_empty() && places.env.is_empty() {
                 Vec::new()
@@ -174,10 +174,6 @@ fn all_devices() -> Vec<Device> {
         None => notice("there is no GPU; the CPU alone is measured"),
     }
     devices
-}
-
-fn only_cpu() -> Vec<Device> {
-    vec![Device::Cpu]
 }
 
 fn effort(arguments: &EffortArguments, default: impl FnOnce() -> Vec<Device>) -> Effort {
@@ -233,7 +229,7 @@ fn free(arguments: &FreeArguments, command: String) -> Plan {
         rows: rows(&arguments.places),
         methods,
         baselines: vec![0],
-        effort: effort(&arguments.effort, only_cpu),
+        effort: effort(&arguments.effort, || vec![Device::Cpu]),
         reference: arguments.reference.clone(),
         command,
     }
@@ -257,18 +253,15 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
     };
     let made = make(plan, &options);
     progress.finish();
-    finish(&made?, &folder)
-}
-
-fn finish(report: &Report, folder: &std::path::Path) -> Result<()> {
+    let report = made?;
     tell(format_args!("the report is {}", folder.join("report.html").display()));
     if report.rows.iter().any(|row| !row.devices.is_empty()) {
-        print(markdown_table(report))?;
+        print(markdown_table(&report))?;
     }
     if report.is_finished {
         return Ok(());
     }
-    Err(Error::at(folder, "stopped before the end; the same command goes on from here"))
+    Err(Error::at(&folder, "stopped before the end; the same command goes on from here"))
 }
 
 /// What it will take, if nothing of it is there yet.

@@ -11,6 +11,10 @@ const LITTLE_NOISE: f64 = 0.05;
 /// Learned probability that may lie where nothing is visible.
 const LEARNED_WELL: f32 = 0.3;
 
+/// What to call the parts, in the order of [`LightPart::ALL`].
+const NAMES: [&str; 5] =
+    ["Seen directly", "Map, direct", "Lamps, direct", "Map, reflected", "Lamps, reflected"];
+
 /// Draws the table of parts, and the advice. `misplaced` is the share of the learned probability that lies where the
 /// truth has none; `None` where nothing was learned.
 pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
@@ -29,13 +33,13 @@ pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
                 ui.label(theme::quiet(name)).on_hover_text(hint);
             }
             ui.end_row();
-            for ((part, luminance), noise) in
-                LightPart::ALL.into_iter().zip(parts.luminance).zip(parts.noise)
+            for ((name, luminance), noise) in
+                NAMES.into_iter().zip(parts.luminance).zip(parts.noise)
             {
                 if luminance > 0.0 {
                     let shares =
                         [luminance / light, noise].map(|share| format!("{:.0} %", 100.0 * share));
-                    for text in [name(part)].into_iter().chain(shares.iter().map(String::as_str)) {
+                    for text in [name].into_iter().chain(shares.iter().map(String::as_str)) {
                         ui.label(RichText::new(text).size(12.5));
                     }
                     ui.end_row();
@@ -45,16 +49,6 @@ pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
     }
     for sentence in sentences(parts, truth.unblocked, misplaced) {
         theme::note(ui, sentence);
-    }
-}
-
-fn name(part: LightPart) -> &'static str {
-    match part {
-        LightPart::Seen => "Seen directly",
-        LightPart::MapDirect => "Map, direct",
-        LightPart::LampsDirect => "Lamps, direct",
-        LightPart::MapReflected => "Map, reflected",
-        LightPart::LampsReflected => "Lamps, reflected",
     }
 }
 

@@ -55,7 +55,8 @@ pub(in crate::app) fn show(
                 developer(ui, interface, commands);
                 // The right panel has it too.
                 if !theme::is_narrow(ui) {
-                    denoise(ui, document);
+                    ui.toggle_value(&mut document.look.denoise, "Denoise")
+                        .on_hover_text("Removes noise on the screen and in .png files (N)");
                 }
                 if !is_tight {
                     ui.separator();
@@ -134,11 +135,6 @@ fn developer(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
     if developer.on_hover_text("Overlays, inspector and plots (F12)").clicked() {
         commands.push(Command::ToggleDeveloper);
     }
-}
-
-fn denoise(ui: &mut Ui, document: &mut Document) {
-    ui.toggle_value(&mut document.look.denoise, "Denoise")
-        .on_hover_text("Removes noise on the screen and in .png files (N)");
 }
 
 #[cfg(test)]
