@@ -6,12 +6,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
-use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::document::Document;
 use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels, SMALL_WIDTH};
 use super::settings_file;
+use super::threads::Joined;
 use crate::error::{At as _, Error, Result};
 use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
 use crate::output::record::to_json;
@@ -26,11 +26,12 @@ const OF_SCENE: &str = "lightgrid.kept.scene-options";
 /// Most files that are looked at for those that can be read.
 const MAX_TRIED: usize = 64;
 
-/// The folder of kept pictures.
+/// The folder of kept pictures. Dropped, it waits until everything is written.
 pub(super) struct Album {
     folder: PathBuf,
-    jobs: Option<Sender<Job>>,
-    thread: Option<JoinHandle<()>>,
+    /// It goes before the thread, which then ends.
+    jobs: Sender<Job>,
+    _thread: Joined,
     written: u32,
 }
 
@@ -61,7 +62,7 @@ impl Album {
                 }
             })
             .map_err(|error| Error::new(format!("no thread for kept pictures: {error}")))?;
-        Ok(Self { folder, jobs: Some(jobs), thread: Some(thread), written: 0 })
+        Ok(Self { folder, jobs, _thread: Joined(Some(thread)), written: 0 })
     }
 
     /// Writes a picture, one day soon; where. From then on its pixels are there and no more in memory.
@@ -117,21 +118,8 @@ impl Album {
     }
 
     fn send(&self, job: impl FnOnce() -> Result<()> + Send + 'static) {
-        if let Some(jobs) = &self.jobs {
-            // The thread ends after this does.
-            let _ = jobs.send(Box::new(job));
-        }
-    }
-}
-
-impl Drop for Album {
-    /// Waits until everything is written.
-    fn drop(&mut self) {
-        self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic there was reported there.
-            let _ = thread.join();
-        }
+        // The thread ends after this does.
+        let _ = self.jobs.send(Box::new(job));
     }
 }
 
@@ -176,14 +164,14 @@ fn read(file: &Path) -> Result<KeptPicture> {
         let found = texts.iter().find(|(name, _)| name == key).map(|(_, text)| text.as_str());
         found.ok_or_else(|| Error::at(file, "is no kept picture"))
     };
-    let document: Document = serde_json::from_str(text(DOCUMENT)?)
-        .map_err(|error| Error::at(file, format!("settings not understood: {error}")))?;
+    let not_understood =
+        |error: serde_json::Error| Error::at(file, format!("settings not understood: {error}"));
+    let document: Document = serde_json::from_str(text(DOCUMENT)?).map_err(not_understood)?;
     if !(document.is_sound() && settings_file::is_within_bounds(&document)) {
         return Err(Error::at(file, "its settings are out of bounds"));
     }
     let of_scene = match text(OF_SCENE) {
-        Ok(text) => serde_json::from_str(text)
-            .map_err(|error| Error::at(file, format!("settings not understood: {error}")))?,
+        Ok(text) => serde_json::from_str(text).map_err(not_understood)?,
         Err(_) => SceneOptions::default(),
     };
     // A program that has had the file in its hands may have left none, or a large one.

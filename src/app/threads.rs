@@ -93,7 +93,19 @@ impl<T> Latest<T> {
 pub(super) struct LatestThread<T> {
     /// What it is given.
     pub(super) latest: Arc<Latest<T>>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Joined,
+}
+
+/// A thread that is waited for when this is dropped.
+pub(super) struct Joined(pub(super) Option<JoinHandle<()>>);
+
+impl Drop for Joined {
+    fn drop(&mut self) {
+        if let Some(thread) = self.0.take() {
+            // A panic there was reported there.
+            let _ = thread.join();
+        }
+    }
 }
 
 impl<T: Send + 'static> LatestThread<T> {
@@ -108,17 +120,13 @@ impl<T: Send + 'static> LatestThread<T> {
     ) -> Result<Self> {
         let inside = Arc::clone(&latest);
         let thread = spawn(name, move || work(&inside))?;
-        Ok(Self { latest, thread: Some(thread) })
+        Ok(Self { latest, _thread: Joined(Some(thread)) })
     }
 }
 
 impl<T> Drop for LatestThread<T> {
     fn drop(&mut self) {
         self.latest.change(|slot| slot.is_closed = true);
-        if let Some(thread) = self.thread.take() {
-            // A panic there was reported there.
-            let _ = thread.join();
-        }
     }
 }
 
