@@ -78,16 +78,8 @@ impl Drag {
         accepts: impl Fn(Pos2) -> bool,
     ) -> Vec<Step> {
         let (layer, context) = (ui.layer_id(), ui.ctx());
-        let is_of_pointer = |event: &&Event| {
-            matches!(
-                event,
-                Event::PointerButton { .. } | Event::PointerMoved(_) | Event::WindowFocused(_)
-            )
-        };
-        let (events, modifiers, is_held) = ui.input(|input| {
-            let events: Vec<_> = input.events.iter().filter(is_of_pointer).cloned().collect();
-            (events, input.modifiers, input.pointer.any_down())
-        });
+        let (events, modifiers, is_held) =
+            ui.input(|input| (input.events.clone(), input.modifiers, input.pointer.any_down()));
         let is_free = |at| context.layer_id_at(at).is_none_or(|there| there == layer);
         let steps =
             Self::follow(drag, &events, (modifiers, slack), |at| accepts(at) && is_free(at));
