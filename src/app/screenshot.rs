@@ -180,7 +180,56 @@ impl Studio {
             let screen = Screen::new(&self.canvas.gpu, FORMAT)?;
             self.app.move_to(screen, &loss);
         }
-        self.canvas.draw(&self.context, &mut self.app, self.time, self.pixels_per_point);
+        let canvas = &mut self.canvas;
+        let (width, height) = (canvas.target.width(), canvas.target.height());
+        let size = egui::Vec2::new(width as f32, height as f32) / self.pixels_per_point;
+        let native_pixels_per_point = Some(self.pixels_per_point);
+        let viewport = egui::ViewportInfo { native_pixels_per_point, ..Default::default() };
+        let input = egui::RawInput {
+            viewports: std::iter::once((egui::ViewportId::ROOT, viewport)).collect(),
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
+            max_texture_side: Some(canvas.gpu.limits.max_texture_dimension_2d as usize),
+            time: Some(self.time),
+            focused: true,
+            ..egui::RawInput::default()
+        };
+        let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
+        let pixels_per_point = output.pixels_per_point;
+        let primitives = self.context.tessellate(output.shapes, pixels_per_point);
+        canvas.copies.follow(&output.textures_delta);
+        let Gpu { device, queue, .. } = &canvas.gpu;
+        let renderer = &mut canvas.renderer;
+        for (id, deltas) in output.textures_delta.set.drain() {
+            for delta in deltas {
+                renderer.update_texture(device, queue, id, &delta);
+            }
+        }
+        let screen = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point };
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut commands =
+            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
+        let view = canvas.target.create_view(&wgpu::TextureViewDescriptor::default());
+        let [r, g, b, a] = theme::PANEL.to_normalized_gamma_f32().map(f64::from);
+        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("window"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
+        commands.push(encoder.finish());
+        queue.submit(commands);
+        for id in &output.textures_delta.free {
+            renderer.free_texture(id);
+        }
+        output.textures_delta.clear();
         self.time += FRAME_SECONDS;
         Ok(())
     }
@@ -229,58 +278,5 @@ impl Canvas {
         let mut renderer = Renderer::new(&gpu.device, FORMAT, renderer_options());
         copies.upload(&gpu, &mut renderer);
         Self { gpu, renderer, target, copies }
-    }
-
-    /// One frame of the application.
-    fn draw(&mut self, context: &egui::Context, app: &mut App, time: f64, pixels_per_point: f32) {
-        let (width, height) = (self.target.width(), self.target.height());
-        let size = egui::Vec2::new(width as f32, height as f32) / pixels_per_point;
-        let native_pixels_per_point = Some(pixels_per_point);
-        let viewport = egui::ViewportInfo { native_pixels_per_point, ..Default::default() };
-        let input = egui::RawInput {
-            viewports: std::iter::once((egui::ViewportId::ROOT, viewport)).collect(),
-            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
-            max_texture_side: Some(self.gpu.limits.max_texture_dimension_2d as usize),
-            time: Some(time),
-            focused: true,
-            ..egui::RawInput::default()
-        };
-        let mut output = context.run_ui(input, |ui| app.show(ui));
-        let pixels_per_point = output.pixels_per_point;
-        let primitives = context.tessellate(output.shapes, pixels_per_point);
-        self.copies.follow(&output.textures_delta);
-        let Gpu { device, queue, .. } = &self.gpu;
-        let renderer = &mut self.renderer;
-        for (id, deltas) in output.textures_delta.set.drain() {
-            for delta in deltas {
-                renderer.update_texture(device, queue, id, &delta);
-            }
-        }
-        let screen = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point };
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut commands =
-            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
-        let view = self.target.create_view(&wgpu::TextureViewDescriptor::default());
-        let [r, g, b, a] = theme::PANEL.to_normalized_gamma_f32().map(f64::from);
-        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("window"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..wgpu::RenderPassDescriptor::default()
-        });
-        renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
-        commands.push(encoder.finish());
-        queue.submit(commands);
-        for id in &output.textures_delta.free {
-            renderer.free_texture(id);
-        }
-        output.textures_delta.clear();
     }
 }
