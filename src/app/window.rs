@@ -130,8 +130,9 @@ fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
 
 /// What there is once a window is open.
 struct Running {
-    canvas: Canvas,
+    /// It goes before the display, which its clipboard is of.
     input: egui_winit::State,
+    canvas: Canvas,
     /// There is none only while one is exchanged for another.
     painter: Option<Painter>,
     /// When a device was lost last, and how many were in a row.
