@@ -98,7 +98,7 @@ impl App {
     ) -> Result<Self> {
         theme::apply(context);
         let tasks = Tasks::new(wakes.draw.clone());
-        let mut history = History::new(start.of_scene);
+        let mut history = History { of_scene: start.of_scene, ..History::default() };
         if let Some(folder) = start.pictures {
             let report = tasks.reporter();
             let report = move |found: Result<_>| report(found.map(TaskResult::KeptPictures));

@@ -176,7 +176,7 @@ pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
 }
 
 /// The command that an event asks for.
-fn requested(event: &Event) -> Option<Command> {
+pub(super) fn requested(event: &Event) -> Option<Command> {
     match event {
         Event::Copy => Some(Command::Copy),
         Event::Text(text) if text == "?" => Some(Command::ToggleShortcuts),
@@ -197,11 +197,6 @@ fn requested(event: &Event) -> Option<Command> {
         }
         _ => None,
     }
-}
-
-/// Whether an event opens a question that is answered by typing.
-pub(super) fn asks_for_path(event: &Event) -> bool {
-    matches!(requested(event), Some(Command::Ask(_)))
 }
 
 #[cfg(test)]

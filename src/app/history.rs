@@ -14,7 +14,8 @@ use crate::scene::SceneOptions;
 pub(crate) struct History {
     /// All of them.
     pub(crate) list: Vec<KeptPicture>,
-    count: u32,
+    /// The number in the latest name.
+    pub(super) count: u32,
     /// The folder that keeps them for the next window; its end waits until everything is written.
     pub(super) album: Option<Album>,
     /// What is asked of the files of scenes.
@@ -22,11 +23,6 @@ pub(crate) struct History {
 }
 
 impl History {
-    /// Of a window in which so much is asked of the files of scenes.
-    pub(crate) fn new(of_scene: SceneOptions) -> Self {
-        Self { of_scene, ..Self::default() }
-    }
-
     /// Takes over what earlier windows left; how many those are.
     pub(crate) fn take_over(&mut self, mut earlier: Vec<KeptPicture>) -> usize {
         let number = |kept: &KeptPicture| kept.name.rsplit(' ').next()?.parse().ok();

@@ -6,7 +6,7 @@ use std::mem::discriminant;
 
 use egui::{Event, Key};
 
-use super::commands;
+use super::commands::{Command, requested};
 
 /// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, no button let go
 /// that was pressed in it, and nothing typed after Enter, which ends what is typed, or after a shortcut that asks for a
@@ -31,7 +31,7 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
         );
         let is_of_another = is_typing && is_over;
         let is_enter = matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
-        is_over |= is_enter || commands::asks_for_path(event);
+        is_over |= is_enter || matches!(requested(event), Some(Command::Ask(_)));
         is_other(event) || (is_down && is_button(false)) || is_of_another
     };
     let end = events.iter().position(ends).unwrap_or(events.len());

@@ -7,18 +7,14 @@ const MAX_ZOOM: f32 = 32.0;
 /// Less than this is none.
 const MIN_ZOOM: f32 = 1.01;
 
-/// A magnification of the picture that fits its room.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zoom {
-    /// Times as large, from 1.
-    pub(super) times: f32,
-    /// Place of the picture in the middle of the room, both coordinates in `[0,1]`.
-    middle: Vec2,
-}
-
-impl Default for Zoom {
-    fn default() -> Self {
-        Self { times: 1.0, middle: Vec2::splat(0.5) }
+with_defaults! {
+    /// A magnification of the picture that fits its room.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Zoom {
+        /// Times as large, from 1.
+        pub(super) times: f32 = 1.0,
+        /// Place of the picture in the middle of the room, both coordinates in `[0,1]`.
+        middle: Vec2 = Vec2::splat(0.5),
     }
 }
 

@@ -212,14 +212,11 @@ fn interface(arguments: &ScreenshotArguments) -> Interface {
         || arguments.inspect.is_some()
         || arguments.tile.is_some()
         || arguments.tiles.is_some();
+    let docks = [(PanelName::Convergence, Dock::Convergence), (PanelName::Needs, Dock::Needs)];
     Interface {
         panels: !has(PanelName::None),
         tab: if is_inspecting { Tab::Inspect } else { Tab::Picture },
-        dock: if has(PanelName::Convergence) {
-            Some(Dock::Convergence)
-        } else {
-            has(PanelName::Needs).then_some(Dock::Needs)
-        },
+        dock: docks.into_iter().find(|(panel, _)| has(*panel)).map(|(_, dock)| dock),
         shortcuts: has(PanelName::Shortcuts),
         overlay: arguments.overlay,
         tile: arguments.tile,

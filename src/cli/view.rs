@@ -116,9 +116,8 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
     let light = &mut document.light;
     light.sampling = arguments.sampling.unwrap_or(light.sampling);
     light.device = arguments.device.unwrap_or(light.device);
-    if let Some((width, height)) = arguments.size {
-        document.size = PictureSize::Fixed(width, height);
-    }
+    let fixed = |(width, height)| PictureSize::Fixed(width, height);
+    document.size = arguments.size.map_or(document.size, fixed);
     if let Some(samples) = arguments.samples {
         document.stop = StopRule { samples: Some(samples), ..StopRule::default() };
     }

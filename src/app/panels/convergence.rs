@@ -9,6 +9,7 @@ use super::button::button;
 use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
 use crate::app::interface::Purpose;
+use crate::app::overlays::palette;
 use crate::app::theme;
 use crate::app::worker::{Point, Reference};
 
@@ -138,10 +139,9 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
             let estimate = run.points.iter().map(|point| place(point, point.noise, by_samples));
             let estimate: PlotPoints<'static> = estimate.collect();
             lines.push(Line::new(name.clone(), estimate).color(color).width(width));
-            let measured = run.points.iter().filter(|point| point.error.is_some_and(|e| e > 0.0));
-            let measured: Vec<[f64; 2]> = measured
-                .map(|point| place(point, point.error.unwrap_or(point.noise), by_samples))
-                .collect();
+            let truth =
+                |point: &Point| Some(place(point, point.error.filter(|e| *e > 0.0)?, by_samples));
+            let measured: Vec<[f64; 2]> = run.points.iter().filter_map(truth).collect();
             if !measured.is_empty() {
                 let line = Line::new(format!("{name}, true"), measured).color(color).width(width);
                 lines.push(line.style(LineStyle::dashed_loose()));
@@ -150,7 +150,8 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
     };
     for (i, run) in convergence.runs.iter().enumerate() {
         let is_current = i + 1 == count;
-        let color = if is_current { theme::ACCENT } else { faded(run.number - 1) };
+        let [r, g, b] = palette::hsv(0.55 + 0.11 * (run.number - 1) as f32, 0.25, 0.55);
+        let color = if is_current { theme::ACCENT } else { Color32::from_rgb(r, g, b) };
         add(run, color, if is_current { 2.0 } else { 1.2 });
     }
     if let Some(run) = &convergence.plain {
@@ -162,11 +163,6 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
 fn place(point: &Point, error: f64, by_samples: bool) -> [f64; 2] {
     let x = if by_samples { point.samples } else { point.seconds };
     [x.max(1e-6).log10(), error.log10()]
-}
-
-fn faded(index: usize) -> Color32 {
-    let [r, g, b] = crate::app::overlays::palette::hsv(0.55 + 0.11 * index as f32, 0.25, 0.55);
-    Color32::from_rgb(r, g, b)
 }
 
 #[cfg(test)]

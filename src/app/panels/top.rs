@@ -52,7 +52,11 @@ pub(in crate::app) fn show(
                 if !is_tight {
                     shortcuts(ui, "?", commands);
                 }
-                developer(ui, interface, commands);
+                let is_developer = interface.tab == Tab::Inspect || interface.dock.is_some();
+                let developer = ui.selectable_label(is_developer, "Inspect");
+                if developer.on_hover_text("Overlays, inspector and plots (F12)").clicked() {
+                    commands.push(Command::ToggleDeveloper);
+                }
                 // The right panel has it too.
                 if !theme::is_narrow(ui) {
                     ui.toggle_value(&mut document.look.denoise, "Denoise")
@@ -62,7 +66,11 @@ pub(in crate::app) fn show(
                     ui.separator();
                     restart(ui, commands);
                 }
-                pause(ui, interface, commands);
+                let words = match interface.paused {
+                    true => ("Resume", "Resume rendering (Space)"),
+                    false => ("Pause", "Pause rendering (Space)"),
+                };
+                button(ui, words, commands, Command::TogglePause);
             });
         });
     });
@@ -94,15 +102,6 @@ fn restart(ui: &mut Ui, commands: &mut Vec<Command>) {
     button(ui, ("Restart", "Start the picture again (R)"), commands, Command::Restart);
 }
 
-fn pause(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
-    let words = if interface.paused {
-        ("Resume", "Resume rendering (Space)")
-    } else {
-        ("Pause", "Pause rendering (Space)")
-    };
-    button(ui, words, commands, Command::TogglePause);
-}
-
 fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
     let mut button = |is_enabled: bool, text: &str, hint: &str, command: Command| {
         let button = ui.add_enabled(is_enabled, egui::Button::new(text));
@@ -127,14 +126,6 @@ fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
 
 fn shortcuts(ui: &mut Ui, text: &str, commands: &mut Vec<Command>) {
     button(ui, (text, "Keys and gestures (?)"), commands, Command::ToggleShortcuts);
-}
-
-fn developer(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
-    let is_developer = interface.tab == Tab::Inspect || interface.dock.is_some();
-    let developer = ui.selectable_label(is_developer, "Inspect");
-    if developer.on_hover_text("Overlays, inspector and plots (F12)").clicked() {
-        commands.push(Command::ToggleDeveloper);
-    }
 }
 
 #[cfg(test)]

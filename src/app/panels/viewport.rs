@@ -20,7 +20,7 @@ use crate::app::theme;
 use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::app::zoom::Zoom;
 use crate::develop::{DevelopSettings, LinearPicture};
-use crate::render::View;
+use crate::render::{Crop, View};
 
 /// Draws the picture and takes gestures; the room it has.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
@@ -90,7 +90,7 @@ impl Places {
                 let whole = fitted((area, scale), view.whole_size());
                 let view = &shown.order.snapshot.request.view;
                 let rect = match view.crop {
-                    Some(crop) => part_rect(middle_rect(whole, crop.whole), view),
+                    Some(crop) => part_rect(middle_rect(whole, crop.whole), view, crop),
                     None => middle_rect(whole, shown.picture.size()),
                 };
                 (whole, rect)
@@ -251,8 +251,7 @@ fn middle_rect(whole: Rect, [width, height]: [u32; 2]) -> Rect {
 }
 
 /// Where in the whole picture's rectangle the view's part of it lies.
-fn part_rect(whole: Rect, view: &View) -> Rect {
-    let Some(crop) = view.crop else { return whole };
+fn part_rect(whole: Rect, view: &View, crop: Crop) -> Rect {
     let [width, height] = crop.whole.map(|pixels| pixels as f32);
     let scale = whole.size() / Vec2::new(width, height);
     let corner = Vec2::new(crop.corner[0] as f32, crop.corner[1] as f32);

@@ -94,13 +94,11 @@ fn run(
                 }
                 (Some(_), _) => Duration::ZERO,
             };
-            match rest.is_zero() {
-                true => {
-                    cancel.store(false, Ordering::Relaxed);
-                    ControlFlow::Break(slot.value.take())
-                }
-                false => ControlFlow::Continue(Some(rest)),
+            if !rest.is_zero() {
+                return ControlFlow::Continue(Some(rest));
             }
+            cancel.store(false, Ordering::Relaxed);
+            ControlFlow::Break(slot.value.take())
         })
     };
     while let Some(order) = next(last.as_ref()) {
