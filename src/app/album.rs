@@ -175,8 +175,7 @@ fn read(file: &Path) -> Result<KeptPicture> {
         Err(_) => SceneOptions::default(),
     };
     // A program that has had the file in its hands may have left none, or a large one.
-    let is_small =
-        |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH && !small.pixels.is_empty();
+    let is_small = |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH;
     let small = read_exr_preview(file)?.filter(is_small);
     let grey = || Rgb8 { width: 1, height: 1, pixels: vec![[160; 3]] };
     Ok(KeptPicture {
