@@ -140,7 +140,7 @@ fn vertex_position(vertex: u32) -> vec3f {
     return vertex_texel(vertex, 0u).xyz;
 }
 
-fn interpolate(corner: Corner, texel: u32) -> vec4f {
+fn corner_value(corner: Corner, texel: u32) -> vec4f {
     return vertex_texel(corner.vertices.x, texel) * corner.weights.x
         + vertex_texel(corner.vertices.y, texel) * corner.weights.y
         + vertex_texel(corner.vertices.z, texel) * corner.weights.z;
@@ -159,7 +159,7 @@ fn read_texture(reference: u32, uvs: vec4f) -> vec4f {
 // Texture coordinates of both sets.
 fn corner_uvs(corner: Corner, first_set: vec2f) -> vec4f {
 //#if SECOND_UV_SET
-    return vec4f(first_set, interpolate(corner, SECOND_UV_TEXEL).xy);
+    return vec4f(first_set, corner_value(corner, SECOND_UV_TEXEL).xy);
 //#else
     return vec4f(first_set, 0.0, 0.0);
 //#end
@@ -223,7 +223,7 @@ fn texture_of(material: u32, texture: u32) -> u32 {
 fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
     var color = material_numbers(corner.material, BASE_COLOR_ALPHA) * texture;
 //#if VERTEX_COLORS
-    color *= interpolate(corner, COLOR_TEXEL);
+    color *= corner_value(corner, COLOR_TEXEL);
 //#end
     return color;
 }
@@ -239,7 +239,7 @@ fn corner_tangent(corner: Corner) -> vec4f {
     return vec4f(a.xyz * w.x + b.xyz * w.y + c.xyz * w.z, a.w);
 //#else
     let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
-    return vec4f(interpolate(corner, TANGENT_TEXEL).xyz, first.w);
+    return vec4f(corner_value(corner, TANGENT_TEXEL).xyz, first.w);
 //#end
 }
 //#end
@@ -288,7 +288,7 @@ fn alpha_at(triangle: u32, barycentric: vec2f) -> f32 {
     if (flags & (ALPHA_MASK | ALPHA_BLEND)) == 0u {
         return 1.0;
     }
-    let uvs = corner_uvs(corner, interpolate(corner, 1u).zw);
+    let uvs = corner_uvs(corner, corner_value(corner, 1u).zw);
     let texture = read_texture(texture_of(corner.material, BASE_COLOR), uvs);
     let cutoff = material_numbers(corner.material, EMISSIVE_CUTOFF).w;
     return opacity(flags, cutoff, corner_base_color(corner, texture).w);
@@ -349,7 +349,7 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
 //#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {
-        p.emissive = p.base_color;
+        p.emissive = p.base_color * emissive.xyz;
     } else {
 //#if EMITTERS
         p.emissive = emissive.xyz * textures[EMISSIVE].xyz;

@@ -204,7 +204,7 @@ impl App {
                 loading: self.assets.loading().next(),
                 document,
                 interface: &self.interface,
-                hides_clock: self.is_repeatable,
+                is_repeatable: self.is_repeatable,
             };
             panels::status::show(ui, &status, commands);
             self.sides(ui, commands);

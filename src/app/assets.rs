@@ -120,6 +120,7 @@ impl Assets {
 
     /// Begins to read a file of the document again; whether there is one.
     pub(super) fn read_again(&mut self, kind: Kind, document: &Document) -> bool {
+        let document = &*document.unmixed();
         let Document { scene, map, sun, .. } = document;
         self.reload.iter_mut().for_each(|reload| reload.forget(kind));
         match kind {

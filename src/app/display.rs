@@ -56,7 +56,9 @@ impl Display {
         // What is on a device that was lost cannot be drawn.
         let is_here =
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
-        self.shown = lock(&self.presenter.shown).clone().filter(is_here);
+        // What was shown before is dropped when the lock is free again.
+        let shown = lock(&self.presenter.shown).clone();
+        self.shown = shown.filter(is_here);
     }
 
     /// The aspect before over the one of now, if another whole picture is shown since this was asked last.

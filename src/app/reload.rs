@@ -42,7 +42,8 @@ impl Reload {
         let changed = Arc::<[AtomicBool; 2]>::default();
         let (sender, news) = channel();
         let flags = Arc::clone(&changed);
-        spawn("reload", move || watch(&news, &flags, &wake))?;
+        // Nobody waits for it: it ends once nothing can be told to it, or when its disk answers.
+        drop(spawn("reload", move || watch(&news, &flags, &wake))?);
         Ok(Self { news: sender, changed, watched: Default::default() })
     }
 

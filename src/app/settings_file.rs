@@ -71,14 +71,14 @@ impl Settings {
     /// data; `None` if there is none.
     pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(DATA)?.join("pictures"));
-        file.map(|file| file.with_added_extension("pictures")).or_else(usual)
+        file.map(|file| beside(file, ".pictures")).or_else(usual)
     }
 
     /// Where small pictures of maps are: beside a settings file that was named, else under the user's folder for
     /// what can be made again; `None` if there is none.
     pub fn small_maps_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(CACHE)?.join("maps"));
-        file.map(|file| file.with_added_extension("maps")).or_else(usual)
+        file.map(|file| beside(file, ".maps")).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -105,7 +105,7 @@ impl Settings {
             Ok(settings) => return (settings, None),
             Err(failure) => failure,
         };
-        let aside = path.with_added_extension("bak");
+        let aside = beside(path, ".bak");
         let notice = match std::fs::copy(path, &aside) {
             Ok(_) => format!("{failure}; it is kept as {}", aside.display()),
             Err(error) => format!("{failure}; it cannot be kept aside: {error}"),
@@ -340,6 +340,13 @@ fn put_first(list: &mut Vec<String>, name: &str) {
     list.retain(|other| other != name);
     list.insert(0, name.to_owned());
     list.truncate(MAX_RECENT);
+}
+
+/// What lies beside a file: its name with an ending.
+fn beside(file: &Path, ending: &str) -> PathBuf {
+    let mut path = file.as_os_str().to_owned();
+    path.push(ending);
+    path.into()
 }
 
 #[cfg(test)]

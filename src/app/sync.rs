@@ -39,7 +39,11 @@ impl App {
                     self.messages.error(error.to_string());
                     if let Some(scene) = &self.assets.scene {
                         let changes = scene.changes.clone();
-                        self.edited.put_back(|document| document.set_changes(changes));
+                        self.edited.put_back(|document| match document.mix() {
+                            None => document.set_changes(changes),
+                            // Factors of a mix are not the scene's.
+                            Some(_) => document.materials = changes.materials,
+                        });
                     }
                 }
                 Loaded::Map(Ok(map)) => self.take_map(map),
@@ -132,7 +136,13 @@ impl App {
                 // At the start there is none: the built-in one is always there.
                 let Document { map, sun, .. } = Document::default();
                 let (map, sun) = shown.unwrap_or((map, sun));
-                self.edited.put_back(|document| (document.map, document.sun) = (map, sun));
+                self.edited.put_back(|document| {
+                    document.map = map;
+                    // That of a mix is not the map's.
+                    if document.mix().is_none() {
+                        document.sun = sun;
+                    }
+                });
             }
         }
     }
@@ -275,6 +285,11 @@ impl App {
         // Another scene would be seen from this one's viewpoint.
         let world = Arc::clone(&self.assets.scene_of(document)?.world);
         let environment = self.assets.environment(document)?;
+        // With a mix on or off, other lights are loaded: until they are there the last picture goes on.
+        let was_mix = self.rendering.worker.latest().is_some_and(|request| request.mix.is_some());
+        if (was_mix || document.mix().is_some()) && !self.assets.are_as_in(document) {
+            return None;
+        }
         let [width, height] = document.size.pixels(interface.viewport_pixels)?;
         let mut view = document.view(width, height)?;
         let (moving, mix) = (interface.is_moving(now) && !self.is_repeatable, document.mix());

@@ -411,7 +411,7 @@ fn a_light_mix_changes_the_picture_that_there_is() {
         |studio: &Studio| Arc::clone(studio.app.rendering.snapshot.as_ref().expect("one"));
     let first = snapshot(&studio);
     let names: Vec<&str> = first.groups.iter().map(|group| &*group.name).collect();
-    assert_eq!(names, ["sky", "sun", "surfaces"]);
+    assert_eq!(names, ["light.sky", "light.sun", "light.surfaces"]);
     studio.app.edited.settle();
     (studio.app.edited.document.intensity, studio.app.edited.document.sun) = (3.0, 0.5);
     studio.settle().expect("rendered");

@@ -239,7 +239,7 @@ pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)
 }
 
-/// Shows such text.
+/// Shows quiet text.
 pub(super) fn note(ui: &mut Ui, text: impl Into<String>) {
     ui.label(quiet(text));
 }

@@ -164,19 +164,19 @@ impl Job<'_> {
         let spare: Vec<u8> =
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
-        let groups = match arguments.light_groups {
-            true => LightGroup::all_of((world, environment), &view)?,
-            false => Vec::new(),
-        };
+        let mut groups = Vec::new();
         let mut each = vec![((world, environment), view.clone())];
-        if !groups.is_empty() {
-            let of_group =
-                |(number, group): (usize, &'_ LightGroup)| group.view(&view, number == 0);
-            let views = groups.iter().enumerate().map(of_group);
+        if arguments.light_groups {
+            groups = LightGroup::all_of((world, environment), environment.parted()?, &view);
+            let of_group = |(number, group)| LightGroup::view(group, &view, number);
+            let views = (0..).zip(&groups).map(of_group);
             let lit = groups.iter().map(|group| (world, &group.environment));
             each = lit.zip(views).collect();
         }
         let count = each.len();
+        // Each has a film, one of cached light, and a layer.
+        memory::check(3 * count as u64 * needed_bytes(arguments)[0] * u64::from(count > 1))
+            .map_err(|cause| too_large(&cause))?;
         let seconds = arguments.seconds.map(|seconds| seconds / count as f64);
         let of_each = RenderArguments { seconds, ..arguments.clone() };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
@@ -186,6 +186,8 @@ impl Job<'_> {
             if !pictures.is_empty() && !self.interrupt.was_signalled() {
                 self.interrupt.go_on();
             }
+            // A GPU need not hold what is done.
+            pictures.iter_mut().for_each(|it: &mut Traced<'_>| it.driver.session.continue_on_cpu());
             let (assignment, picture, ended) =
                 self.trace(&of_each, lit, view, counted, (&mut notices, progress))?;
             assignments.push(assignment);

@@ -36,10 +36,11 @@ use self::table::{Search, Table};
 use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::color::importance;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::huge_pages::zeros_on_huge_pages;
 use crate::image::Image;
 use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
+use crate::memory;
 use crate::prefetch::prefetch;
 use crate::sampler::hash;
 
@@ -172,6 +173,9 @@ impl Environment {
     }
 
     fn with_map(&self, map: Image) -> Result<Self> {
+        // The table takes as much again.
+        memory::check(2 * size_of_val(&*map.pixels) as u64)
+            .map_err(|cause| Error::new(format!("a map with another sun {cause}")))?;
         let (tile_columns, tile_rows) = self.tile_grid();
         let options = EnvironmentOptions {
             table: self.table_kind,

@@ -158,7 +158,6 @@ impl Defects {
 /// Formats that are read.
 const KNOWN: &str = "EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, TGA";
 
-/// Who decodes a file.
 /// Reads by the format that the first bytes tell, else the extension.
 fn read(path: &Path) -> Result<FilePicture> {
     /// No format takes more bytes to be told.

@@ -171,7 +171,7 @@ pub fn write_picture(
         let (mut image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
         layers.extend(films.groups.iter().map(|GroupImage { name, factor, image }| {
             let pixels: Vec<_> = image.pixels.iter().map(|rgb| rgb.map(|x| x * factor)).collect();
-            Layer { name: format!("light.{name}"), channels: split(&pixels, ["R", "G", "B"]) }
+            Layer { name: name.clone(), channels: split(&pixels, ["R", "G", "B"]) }
         }));
         let is_rgb = options.rgb == LinearRgb::Denoised;
         if (is_rgb || options.layers.contains(&LayerName::Denoised)) && options.denoiser.is_some() {

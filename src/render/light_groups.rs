@@ -3,13 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::View;
 use super::film::{Film, Pixel, Surface};
 use crate::environment::Environment;
-use crate::error::Result;
 use crate::image::Image;
 use crate::path::{Background, LightChoice, Lit, World};
 use crate::scene::needs::SceneFeatures;
@@ -20,7 +19,7 @@ pub(crate) const MAX_LAMPS: usize = 16;
 
 /// What shines in one film alone.
 pub(crate) struct LightGroup {
-    /// What to call its layer.
+    /// Its layer's.
     pub(crate) name: String,
     source: Source,
     /// Its map, which is black but for sky and sun.
@@ -33,7 +32,7 @@ enum Source {
     Sun,
     /// Point, spot and directional lights of a name.
     Lamp(String),
-    /// What surfaces emit.
+    /// What surfaces emit, and a colour behind them.
     Surfaces,
 }
 
@@ -59,43 +58,45 @@ impl LightFactors {
     /// All lights inside a scene times their factors.
     pub(crate) fn local_lights(&self, world: &World) -> LightChoice {
         let of_light = |light: &PunctualLight| (light.name.clone(), self.of_lamp(&light.name));
-        let lamps = world.scene.lights.iter().map(of_light).collect();
-        LightChoice::Some { surfaces: true, lamps: Arc::new(lamps) }
+        let lamps: BTreeMap<_, _> = world.scene.lights.iter().map(of_light).collect();
+        match lamps.values().all(|factor| *factor == 1.0) {
+            true => LightChoice::All,
+            false => LightChoice::Some { surfaces: true, lamps: Arc::new(lamps) },
+        }
     }
 }
 
 impl LightGroup {
-    /// The groups of a scene and its map, whose factors are all 1; at least one.
-    ///
-    /// # Errors
-    /// As [`Environment::new`].
-    pub(crate) fn all_of((world, environment): Lit<'_>, view: &View) -> Result<Vec<Self>> {
-        let mut groups = Vec::new();
-        let mut add = |name: &str, source: Source, environment: &Environment| {
-            let (name, environment) = (name.to_owned(), environment.clone());
-            groups.push(Self { name, source, environment });
-        };
+    /// The groups of a scene and its map, whose factors are all 1; at least one. `parted` is that map without its sun, and
+    /// with nothing else ([`Environment::parted`]).
+    pub(crate) fn all_of(
+        (world, environment): Lit<'_>,
+        parted: [Environment; 2],
+        view: &View,
+    ) -> Vec<Self> {
         let mut black = environment.clone();
         black.set_intensity(0.0);
-        if !environment.is_black() {
-            let [sky, sun] = environment.parted()?;
-            add("sky", Source::Sky, &sky);
-            if !sun.is_black() {
-                add("sun", Source::Sun, &sun);
-            }
-        }
-        let lights = world.scene.lights.iter();
-        let names: BTreeSet<&str> = lights.map(|light| &*light.name).collect();
-        for name in names {
-            add(name, Source::Lamp(name.to_owned()), &black);
-        }
+        let [sky, sun] = parted;
+        let of_map = [("light.sky", Source::Sky, sky), ("light.sun", Source::Sun, sun)]
+            .map(|(name, source, environment)| Self { name: name.to_owned(), source, environment });
+        let mut groups: Vec<Self> =
+            of_map.into_iter().filter(|group| !group.environment.is_black()).collect();
+        let shining = world.scene.lights.iter().filter(|light| light.intensity != Vec3::ZERO);
+        let names: BTreeSet<&str> = shining.map(|light| &*light.name).collect();
+        groups.extend(names.into_iter().map(|name| Self {
+            name: format!("lamp.{name}"),
+            source: Source::Lamp(name.to_owned()),
+            environment: black.clone(),
+        }));
         // A colour behind the scene has no factor either.
         let has_color = matches!(view.background, Background::Color(_));
-        if world.needs.has(SceneFeatures::EMITTERS) || has_color || groups.is_empty() {
-            let source = Source::Surfaces;
-            groups.push(Self { name: "surfaces".to_owned(), source, environment: black });
+        let shines =
+            world.needs.features.intersects(SceneFeatures::EMITTERS | SceneFeatures::UNLIT);
+        if shines || has_color || groups.is_empty() {
+            let (name, source) = ("light.surfaces".to_owned(), Source::Surfaces);
+            groups.push(Self { name, source, environment: black });
         }
-        Ok(groups)
+        groups
     }
 
     /// The group's factor among these.
@@ -108,8 +109,9 @@ impl LightGroup {
         }
     }
 
-    /// The view by its light alone, with layers if it is the first.
-    pub(crate) fn view(&self, view: &View, is_first: bool) -> View {
+    /// The view by its light alone, with layers if it is the first of all, and random numbers of its own: noise of
+    /// groups must not be alike.
+    pub(crate) fn view(&self, view: &View, number: u32) -> View {
         let lamps = match &self.source {
             Source::Lamp(name) => BTreeMap::from([(name.clone(), 1.0)]),
             _ => BTreeMap::new(),
@@ -120,14 +122,16 @@ impl LightGroup {
             background => background,
         };
         let local_lights = LightChoice::Some { surfaces, lamps: Arc::new(lamps) };
-        View { local_lights, background, layers: view.layers && is_first, ..view.clone() }
+        let (seed, layers) =
+            (view.seed ^ number.wrapping_mul(0x9e37_79b9), view.layers && number == 0);
+        View { local_lights, background, seed, layers, ..view.clone() }
     }
 }
 
 /// What one group of light makes of a picture.
 #[derive(Debug, Clone)]
 pub struct GroupImage {
-    /// What it is called.
+    /// What its layer is called.
     pub name: String,
     /// How much of it is in the picture.
     pub factor: f32,
@@ -164,8 +168,6 @@ pub(crate) fn mixed(films: &[(&Film, f32)]) -> Film {
 mod tests {
     use std::sync::atomic::AtomicBool;
 
-    use glam::Vec3;
-
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::render::gpu::{Gpu, UploadedScene};
@@ -175,6 +177,9 @@ mod tests {
     /// A room with emissive surfaces, a lamp of one name and two of another, under a sky with a sun.
     fn room() -> (World, Environment) {
         let mut scene = builtin::build("evening").expect("built in");
+        // Seen as it is: it shines, too.
+        let sofa = scene.materials.iter_mut().find(|material| material.name == "sofa");
+        sofa.expect("there is one").unlit = true;
         let camera = scene.cameras[0].world_from_camera;
         let eye = Vec3::from(camera.translation);
         let light = |name: &str, aside: f32| PunctualLight {
@@ -218,14 +223,16 @@ mod tests {
         let camera = world.scene.cameras[0].clone();
         let (sharing, background) = (Sharing::Off, Background::Color([0.1; 3]));
         let view = View { sharing, background, layers: true, ..View::new(camera, [48, 32]) };
-        let groups = LightGroup::all_of((&world, &environment), &view).expect("sound maps");
+        let parted = environment.parted().expect("sound maps");
+        let groups = LightGroup::all_of((&world, &environment), parted, &view);
         let names: Vec<&str> = groups.iter().map(|group| &*group.name).collect();
-        assert_eq!(names, ["sky", "sun", "fill", "key", "surfaces"]);
+        let all = ["light.sky", "light.sun", "lamp.fill", "lamp.key", "light.surfaces"];
+        assert_eq!(names, all);
         let all = |gpu: Option<&Gpu>| -> Vec<Film> {
-            let of_group = |(number, group): (usize, &LightGroup)| {
-                rendered((&world, &group.environment), group.view(&view, number == 0), gpu)
+            let of_group = |(number, group): (u32, &LightGroup)| {
+                rendered((&world, &group.environment), group.view(&view, number), gpu)
             };
-            groups.iter().enumerate().map(of_group).collect()
+            (0..).zip(&groups).map(of_group).collect()
         };
         let films = all(None);
         for (film, name) in films.iter().zip(&names) {

@@ -33,7 +33,7 @@ type Colors = Vec<Option<[u8; 3]>>;
 /// An overlay's colours, one per pixel, and their meaning. On the device they are a texture.
 #[derive(Clone)]
 pub(in crate::app) struct Painted<C = Colors> {
-    /// They.
+    /// One a pixel, or a texture of them.
     pub(in crate::app) colors: C,
     /// What they mean.
     pub(in crate::app) legend: Legend,

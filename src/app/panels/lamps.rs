@@ -18,7 +18,7 @@ const NAME_WIDTH: f32 = 102.0;
 /// Draws the section.
 pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
     let Controls { document, interface, .. } = controls;
-    let is_late = !document.light_mix;
+    let is_late = document.mix().is_none();
     late_factor(ui, "All", "Brightness of all lamps", (&mut document.lamps, is_late));
     let mut has_changed = false;
     let mut rows = |ui: &mut Ui, rows: Range<usize>| {
@@ -29,7 +29,8 @@ pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene
             if edit == before {
                 continue;
             }
-            has_changed = true;
+            // A colour begins another picture in a mix, too.
+            has_changed |= is_late || edit.color != before.color;
             if edit == LampEdit::default() {
                 document.lamp_edits.remove(&lamp.name);
             } else {
@@ -49,9 +50,9 @@ pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene
     if is_changed && ui.button(RichText::new("Reset lamps").size(12.0)).clicked() {
         document.lamps = 1.0;
         document.lamp_edits.clear();
-        has_changed = true;
+        has_changed |= is_late;
     }
-    if has_changed && is_late {
+    if has_changed {
         interface.keep_moving(ui.ctx());
     }
 }

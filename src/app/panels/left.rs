@@ -251,18 +251,23 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     button(ui, words, commands, Command::ToggleSun);
     let slider = factor(&mut document.intensity);
     let is_dragged = theme::set(ui, "Intensity", "Brightness of the map", slider).dragged();
-    if is_dragged && !document.light_mix {
+    let is_late = document.mix().is_none();
+    if is_dragged && is_late {
         interface.keep_moving(ui.ctx());
     }
     let hint = "Brightness of the map's sun alone; its sky stays as it is";
-    late_factor(ui, "Sun", hint, (&mut document.sun, !document.light_mix));
+    late_factor(ui, "Sun", hint, (&mut document.sun, is_late));
     let lamps = sources.scene.map_or(0, |scene| scene.named_lamps.len());
     let may_mix = !document.light.split && lamps <= MAX_LAMPS;
     let mix = Checkbox::new(&mut document.light_mix, "Light mix");
-    ui.add_enabled(may_mix, mix).on_hover_text(
-        "Sky, sun and each lamp get a picture of their own, so that changes to intensity, sun and lamps are seen at \
-         once, in the finished picture, too. It takes longer to become clean, and as many times the memory",
-    );
+    ui.add_enabled(may_mix, mix)
+        .on_hover_text(
+            "Sky, sun and each lamp get a picture of their own. Intensity, sun and lamps then change what is \
+             shown at once. All these pictures take their share of time and memory",
+        )
+        .on_disabled_hover_text(format!(
+            "Not beside a split view, nor with more than {MAX_LAMPS} lamps"
+        ));
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
         let text = RichText::new("Reset rotation, intensity and sun").size(12.0);

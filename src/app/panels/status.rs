@@ -25,7 +25,7 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) document: &'a Document,
     pub(in crate::app) interface: &'a Interface,
     /// Figures that depend on the clock are left out, and those of what is pointed at.
-    pub(in crate::app) hides_clock: bool,
+    pub(in crate::app) is_repeatable: bool,
 }
 
 /// What a picture is good for: word, colour, hint, and the largest relative error of blocks without noise, and of pixels
@@ -53,7 +53,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(snapshot) = &status.rendering.snapshot {
-                    let pointed = status.interface.pointed.filter(|_| !status.hides_clock);
+                    let pointed = status.interface.pointed.filter(|_| !status.is_repeatable);
                     let pointed = pointed.zip(status.shown);
                     // Where there is room for one, what is pointed at comes first.
                     if pointed.is_none() || !theme::is_narrow(ui) {
@@ -78,7 +78,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<
 fn phase(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
     if let Some(loading) = &status.loading {
         let name = theme::file_name(loading.name);
-        let text = match loading.seconds < MIN_LOADING_SECONDS || status.hides_clock {
+        let text = match loading.seconds < MIN_LOADING_SECONDS || status.is_repeatable {
             true => format!("Loading {name}…"),
             false => format!("Loading {name}: {}, {:.0} s", loading.step, loading.seconds),
         };
@@ -146,7 +146,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
     }
     let hint = "Mean samples per pixel, of cached light too";
     number(ui, &theme::samples(snapshot.mean_samples()), "samples", hint);
-    if !status.hides_clock {
+    if !status.is_repeatable {
         let hint = "Time spent on learning and rendering, cached light included";
         number(ui, &theme::clock(snapshot.seconds()), "", hint);
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);

@@ -145,7 +145,7 @@ impl Memory {
         if order.still_ahead().is_some() && order.is_left() {
             return Ok(None);
         }
-        let prepare = || match self.recent.come_back(order) {
+        let prepare = || match self.recent.come_back(order).filter(|_| mix.is_none()) {
             Some(kept) => {
                 let prepared = Prepared::of(&developer, Arc::clone(&kept.image));
                 Ok(Some(Prepared { is_carried: kept.is_carried, ..prepared }))

@@ -60,6 +60,7 @@ impl Order {
         if let Some(backdrop) = &mut snapshot.backdrop {
             backdrop.film = Arc::default();
         }
+        snapshot.groups = Arc::default();
         Self { snapshot: Arc::new(snapshot), ..self.clone() }
     }
 

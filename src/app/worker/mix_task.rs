@@ -1,10 +1,11 @@
 //! A light mix: a picture of each group of light, shown as their sum.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::inspection::Inspection;
-use super::preview::gap_after;
+use super::preview::{MAX_GAP, gap_after};
 use super::request::Request;
 use super::sessions::Sessions;
 use super::snapshot::{Activity, Backdrop, NoCache, SessionSnapshot, Snapshot};
@@ -12,7 +13,7 @@ use crate::render::block_errors::block_errors;
 use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
 use crate::render::light_groups::{GroupImage, LightFactors, LightGroup, mixed};
-use crate::render::{Figures, Phase, Session, StopRule};
+use crate::render::{Figures, Phase, Session, cut_off_notice};
 
 /// Works on the groups of one request until something else is asked for.
 pub(super) struct MixTask<'a> {
@@ -21,6 +22,10 @@ pub(super) struct MixTask<'a> {
     /// When it was published last, for which request, and what had been done.
     published: Option<(Instant, Arc<Request>, Activity, u64)>,
     publish_gap: Duration,
+    /// The exact samples of a sum, its noise, and the factors that it had.
+    noise: (u32, f64, Option<LightFactors>),
+    /// A sentence where paths end with much of their light left.
+    cut_off: OnceCell<Option<Arc<str>>>,
 }
 
 /// The pictures by one group.
@@ -37,9 +42,10 @@ impl GroupPicture<'_> {
         [&self.main].into_iter().chain(self.cached.iter().map(|cached| &cached.session))
     }
 
-    /// Samples of all pixels, of both pictures.
-    fn samples(&self) -> u64 {
-        self.sessions().map(|session| session.figures().samples).sum()
+    /// Samples of all pixels, of those by cached light as long as they are shown.
+    fn samples(&self, shows_cached: bool) -> u64 {
+        let sessions = self.sessions().take(if shows_cached { 2 } else { 1 });
+        sessions.map(|session| session.figures().samples).sum()
     }
 
     fn seconds(&self) -> f64 {
@@ -56,7 +62,9 @@ impl GroupPicture<'_> {
 impl<'a> MixTask<'a> {
     pub(super) fn new(sessions: Sessions<'a>) -> Self {
         let inspection = Inspection::default();
-        Self { sessions, inspection, published: None, publish_gap: Duration::ZERO }
+        let (publish_gap, cut_off) = (Duration::ZERO, OnceCell::new());
+        let noise = (0, f64::INFINITY, None);
+        Self { sessions, inspection, published: None, publish_gap, noise, cut_off }
     }
 
     /// Works until something else is asked for; the request that was worked on last.
@@ -65,62 +73,83 @@ impl<'a> MixTask<'a> {
         let may_cache = suits(world, &view);
         let mut pictures = Vec::with_capacity(groups.len());
         for group in groups {
-            let view = group.view(&view, pictures.is_empty());
+            let view = group.view(&view, pictures.len() as u32);
             let main = Session::new(world, &group.environment, view);
             pictures.push(GroupPicture { group, main, cached: None, turns: 0 });
         }
         while self.sessions.watch.takes_up_latest() {
             let activity = self.activity(&pictures);
-            let next = pictures.iter_mut().min_by_key(|picture| picture.samples());
-            match (activity, next) {
-                (Activity::Learning(_) | Activity::Rendering, Some(picture)) => {
-                    self.advance(picture, may_cache);
-                    self.publish_if_due(activity, &pictures);
-                }
-                _ => {
-                    for picture in &mut pictures {
-                        let settled = picture.main.settle();
-                        self.sessions.go_on(&mut picture.main, settled);
-                    }
-                    self.publish(activity, &pictures);
-                    self.sessions.rest();
-                }
+            // Other factors before anything else.
+            self.publish_if_due(activity, &pictures);
+            let shows_cached = self.sessions.watch.request.wants_cached;
+            if matches!(activity, Activity::Learning(_) | Activity::Rendering) {
+                let next = pictures.iter_mut().min_by_key(|picture| picture.samples(shows_cached));
+                next.into_iter().for_each(|picture| self.advance(picture, may_cache));
+            } else if self.settle(&mut pictures) {
+                self.publish(activity, &pictures);
+                self.sessions.device.note_compiled();
+                self.sessions.rest();
             }
         }
         self.sessions.watch.request
     }
 
+    /// Waits for what a GPU is still at work on; whether none has failed.
+    fn settle(&mut self, pictures: &mut [GroupPicture<'_>]) -> bool {
+        let mut is_settled = true;
+        for picture in pictures {
+            let settled = picture.main.settle();
+            is_settled &= settled.is_ok();
+            self.sessions.go_on(&mut picture.main, settled);
+        }
+        is_settled
+    }
+
     /// What is to be done next.
-    fn activity(&self, pictures: &[GroupPicture<'_>]) -> Activity {
+    fn activity(&mut self, pictures: &[GroupPicture<'_>]) -> Activity {
         let (request, rule) = (&self.sessions.watch.request, self.sessions.watch.request.rule);
-        let samples = rule.samples.map(|most| u64::from(most) * request.view.pixels());
-        let of_each = StopRule { seconds: None, samples: None, ..rule };
-        let is_met = |picture: &GroupPicture<'_>| {
-            of_each.is_met(&picture.main) || samples.is_some_and(|most| picture.samples() >= most)
-        };
+        let (is_paused, shows_cached) = (request.paused, request.wants_cached);
+        let least = pictures.iter().map(|it| it.samples(shows_cached)).min().unwrap_or(0);
+        let most = rule.samples.map(|most| u64::from(most) * request.view.pixels());
         let seconds: f64 = pictures.iter().map(GroupPicture::seconds).sum();
-        let is_over = rule.seconds.is_some_and(|most| seconds >= most);
-        let are_there = pictures.iter().all(|picture| picture.main.samples() > 0);
-        if request.paused {
+        let exact = pictures.iter().map(|it| it.main.samples()).min().unwrap_or(0);
+        let is_done = most.is_some_and(|most| least >= most)
+            || rule.seconds.is_some_and(|most| seconds >= most)
+            || rule.noise.is_some_and(|limit| self.has_noise_below(limit, exact, pictures));
+        let learns = |picture: &&GroupPicture<'_>| !picture.group.environment.is_black();
+        if is_paused {
             Activity::Paused
-        } else if are_there && (is_over || pictures.iter().all(is_met)) {
+        } else if exact > 0 && is_done {
             Activity::Done
         } else if pictures.iter().any(|picture| picture.main.phase() == Phase::Learning) {
-            let paths = |picture: &GroupPicture<'_>| {
-                [picture.main.figures().learning_paths, picture.main.view().learning_paths]
-            };
-            let [done, all] = [0, 1].map(|at| pictures.iter().map(|it| paths(it)[at]).sum::<u64>());
-            Activity::Learning(done as f32 / all.max(1) as f32)
+            let shares = pictures.iter().filter(learns).map(|picture| {
+                let (done, all) = (picture.main.figures(), picture.main.view().learning_paths);
+                done.learning_paths as f32 / all.max(1) as f32
+            });
+            Activity::Learning(shares.sum::<f32>() / pictures.iter().filter(learns).count() as f32)
         } else {
             Activity::Rendering
         }
+    }
+
+    /// Whether the sum of so many exact samples has no more noise than this; it is found out anew where they are a
+    /// sixteenth more.
+    fn has_noise_below(&mut self, limit: f64, exact: u32, pictures: &[GroupPicture<'_>]) -> bool {
+        let (of, _, factors) = &self.noise;
+        let mix = &self.sessions.watch.request.mix;
+        if exact >= 16 && (exact - (*of).min(exact) > exact / 16 || factors != mix) {
+            let films = films(pictures, mix.as_ref(), |picture| Some(picture.main.film()));
+            self.noise = (exact, mixed(&films).noise(), mix.clone());
+        }
+        exact >= 16 && self.noise.1 <= limit
     }
 
     /// Does a piece of work for one group.
     fn advance(&mut self, picture: &mut GroupPicture<'a>, may_cache: bool) {
         let GroupPicture { group, main, cached, turns } = picture;
         self.sessions.environment = &group.environment;
-        if !self.sessions.place(main) {
+        // Kernels are compiled for one after the other.
+        if !self.sessions.device.is_compiling() && !self.sessions.place(main) {
             return;
         }
         let begins = !main.is_begun() && self.sessions.beginning(main).is_some();
@@ -144,11 +173,11 @@ impl<'a> MixTask<'a> {
 
     fn publish_if_due(&mut self, activity: Activity, pictures: &[GroupPicture<'_>]) {
         let request = &self.sessions.watch.request;
-        let samples: u64 = pictures.iter().map(GroupPicture::samples).sum();
+        let samples: u64 = pictures.iter().map(|picture| picture.samples(true)).sum();
+        let is_throttled = self.sessions.watch.shared.throttle.lasts(MAX_GAP);
         let is_due = self.published.as_ref().is_none_or(|(at, of, was, count)| {
-            // Other factors are shown at once.
             let is_news = *was != activity || *count != samples;
-            of.mix != request.mix || is_news && at.elapsed() >= self.publish_gap
+            of.mix != request.mix || is_news && at.elapsed() >= self.publish_gap && !is_throttled
         });
         if is_due && request.previews && !self.sessions.watch.is_superseded() {
             self.publish(activity, pictures);
@@ -159,9 +188,9 @@ impl<'a> MixTask<'a> {
         let start = Instant::now();
         let (shared, request) =
             (self.sessions.watch.shared, Arc::clone(&self.sessions.watch.request));
-        let (Some(factors), Some(first)) = (&request.mix, pictures.first()) else { return };
-        let film = Arc::new(mixed(&films(pictures, factors, |picture| Some(picture.main.film()))));
-        let cached = films(pictures, factors, GroupPicture::cached_film);
+        let (mix, Some(first)) = (request.mix.as_ref(), pictures.first()) else { return };
+        let film = Arc::new(mixed(&films(pictures, mix, |picture| Some(picture.main.film()))));
+        let cached = films(pictures, mix, GroupPicture::cached_film);
         let cached =
             (cached.len() == pictures.len() && request.wants_cached).then(|| mixed(&cached));
         let errors = block_errors(&film, cached.as_ref());
@@ -189,12 +218,21 @@ impl<'a> MixTask<'a> {
             on_device: None,
         };
         let seconds: f64 = pictures.iter().map(GroupPicture::seconds).sum();
-        let image = |picture: &GroupPicture<'_>| GroupImage {
+        let image = |(picture, (film, factor)): (&GroupPicture<'_>, (&Film, f32))| GroupImage {
             name: picture.group.name.clone(),
-            factor: picture.group.factor(factors),
-            image: picture.main.film().image(),
+            factor,
+            image: film.image(),
         };
-        let groups = pictures.iter().map(image).collect();
+        let exact = films(pictures, mix, |picture| Some(picture.main.film()));
+        let groups = pictures.iter().zip(exact).map(image).collect();
+        let lit = (self.sessions.world, &*request.environment);
+        let cut_off = match main.samples {
+            0 => None,
+            _ => self
+                .cut_off
+                .get_or_init(|| cut_off_notice(lit, &request.view).map(Arc::from))
+                .clone(),
+        };
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {
@@ -207,25 +245,27 @@ impl<'a> MixTask<'a> {
             counters: None,
             backdrop,
             errors,
-            cut_off: None,
+            cut_off,
             cache: Err(NoCache::Mixed),
             curves: Default::default(),
             groups,
             rest: Arc::clone(&shared.throttle),
             request: Arc::clone(&request),
         });
-        let samples = pictures.iter().map(GroupPicture::samples).sum();
+        let samples = pictures.iter().map(|picture| picture.samples(true)).sum();
         self.published = Some((Instant::now(), request, activity, samples));
         self.publish_gap = gap_after(start.elapsed());
     }
 }
 
-/// Films of groups with their factors; none of those that have none.
+/// Films of the groups that have one, with their factors.
 fn films<'p, 'g>(
     pictures: &'p [GroupPicture<'g>],
-    factors: &LightFactors,
+    factors: Option<&LightFactors>,
     film: impl Fn(&'p GroupPicture<'g>) -> Option<&'p Film>,
 ) -> Vec<(&'p Film, f32)> {
-    let with_factor = |picture| Some((film(picture)?, picture.group.factor(factors)));
+    let with_factor = |picture: &'p GroupPicture<'g>| {
+        Some((film(picture)?, factors.map_or(1.0, |factors| picture.group.factor(factors))))
+    };
     pictures.iter().filter_map(with_factor).collect()
 }

@@ -169,15 +169,17 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
     while let Some(request) = next(done.as_deref()) {
         kept.leave_other_worlds(&request);
         let worked = catch_unwind(AssertUnwindSafe(|| {
-            // A moving picture is lit as the mix is.
-            let lit = request.mix.as_ref().filter(|_| request.moving);
-            let lit = lit.and_then(|factors| kept.lit_by(&request.environment, factors));
-            let environment = lit.as_ref().unwrap_or(&request.environment);
-            let is_mix = request.mix.is_some() && !request.moving;
-            let groups = is_mix
-                .then(|| LightGroup::all_of((&request.world, &request.environment), &request.view));
             let say = |failure: &Error| shared.report_failure(failure.to_string());
-            let groups = groups.and_then(|groups| groups.inspect_err(say).ok());
+            let (map, mix) = (&request.environment, request.mix.as_ref());
+            // A moving picture is lit as the mix is.
+            let lit = mix
+                .filter(|_| request.moving)
+                .map(|factors| pool.install(|| kept.lit_by(map, factors)).inspect_err(say));
+            let environment = lit.as_ref().and_then(|lit| lit.as_ref().ok()).unwrap_or(map);
+            let groups = mix.filter(|_| !request.moving).map(|_| {
+                let parted = pool.install(|| kept.parted(map)).inspect_err(say)?;
+                Ok::<_, Error>(LightGroup::all_of((&request.world, map), parted, &request.view))
+            });
             let sessions = Sessions {
                 world: &request.world,
                 environment,
@@ -187,8 +189,8 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
                 alarm: &alarm,
             };
             pool.install(|| match &groups {
-                Some(groups) => MixTask::new(sessions).work(groups),
-                None => PictureTask::new(sessions).work(),
+                Some(Ok(groups)) => MixTask::new(sessions).work(groups),
+                _ => PictureTask::new(sessions).work(),
             })
         }));
         done = Some(worked.unwrap_or_else(|_| {

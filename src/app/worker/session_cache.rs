@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::request::Request;
 use super::snapshot::Point;
 use crate::environment::Environment;
+use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::cached_picture::CachedPicture;
@@ -26,7 +27,9 @@ pub(super) struct SessionCache {
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
     /// A map as it was lit by a mix last: what it was made from, and the factor on its sun.
-    lit: Option<(Arc<Environment>, f32, Environment)>,
+    lit: Option<(Environment, f32, Environment)>,
+    /// A map as a mix has parted it last, and what it was made from.
+    parts: Option<(Environment, [Environment; 2])>,
     /// Pictures that were left for others, oldest first.
     left: Vec<SuspendedPicture>,
 }
@@ -102,6 +105,9 @@ impl SessionCache {
     /// surfaces get another colour; what they look like does not.
     pub(super) fn leave_other_worlds(&mut self, request: &Request) {
         let world = &request.world;
+        if request.mix.is_none() {
+            (self.lit, self.parts) = (None, None);
+        }
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
         self.training.take_if(|(_, of)| is_other(of));
         self.left.retain(|left| !is_other(&left.request));
@@ -122,24 +128,38 @@ impl SessionCache {
         }
     }
 
-    /// A map of factors 1 as these make it; `None` if that cannot be made.
+    /// A map of factors 1 as these make it.
+    ///
+    /// # Errors
+    /// If there is no memory for it.
     pub(super) fn lit_by(
         &mut self,
-        map: &Arc<Environment>,
+        map: &Environment,
         factors: &LightFactors,
-    ) -> Option<Environment> {
+    ) -> Result<Environment> {
         let sun = factors.sun;
-        let is_it = |(of, factor, _): &(Arc<Environment>, f32, Environment)| {
-            of.shares_map_with(map) && *factor == sun
+        self.lit.take_if(|(of, factor, _)| !of.shares_map_with(map) || *factor != sun);
+        let (_, _, lit) = match self.lit.take() {
+            Some(lit) => self.lit.insert(lit),
+            None if sun == 1.0 => self.lit.insert((map.clone(), sun, map.clone())),
+            None => self.lit.insert((map.clone(), sun, map.with_sun(sun)?)),
         };
-        if !self.lit.as_ref().is_some_and(is_it) {
-            let lit = if sun == 1.0 { (**map).clone() } else { map.with_sun(sun).ok()? };
-            self.lit = Some((Arc::clone(map), sun, lit));
-        }
-        let mut lit = self.lit.as_ref()?.2.clone();
+        let mut lit = turned(lit, map);
         lit.set_intensity(factors.intensity);
-        lit.set_rotation(map.rotation_and_intensity().0 * TAU);
-        Some(lit)
+        Ok(lit)
+    }
+
+    /// A map without its sun, and with nothing else.
+    ///
+    /// # Errors
+    /// If there is no memory for them.
+    pub(super) fn parted(&mut self, map: &Environment) -> Result<[Environment; 2]> {
+        self.parts.take_if(|(of, _)| !of.shares_map_with(map));
+        let (_, parts) = match self.parts.take() {
+            Some(parts) => self.parts.insert(parts),
+            None => self.parts.insert((map.clone(), map.parted()?)),
+        };
+        Ok(parts.each_ref().map(|part| turned(part, map)))
     }
 
     /// Whether learning has come to its end in this scene.
@@ -184,6 +204,13 @@ impl SessionCache {
     fn learned_in(&self, request: &Request) -> Option<&Learned> {
         self.learned.as_ref().filter(|learned| Arc::ptr_eq(&learned.world, &request.world))
     }
+}
+
+/// A map turned as another one is.
+fn turned(map: &Environment, like: &Environment) -> Environment {
+    let mut turned = map.clone();
+    turned.set_rotation(like.rotation_and_intensity().0 * TAU);
+    turned
 }
 
 #[cfg(test)]

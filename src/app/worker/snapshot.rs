@@ -129,7 +129,7 @@ pub(crate) struct Snapshot {
     /// A sentence where paths end with much of their light left.
     pub cut_off: Option<Arc<str>>,
     /// The light of each group of a light mix, without factors.
-    pub groups: Vec<GroupImage>,
+    pub groups: Arc<[GroupImage]>,
     /// Whoever shows it says here when the next one will be wanted.
     pub(in crate::app) rest: Arc<PublishThrottle>,
 }

@@ -449,7 +449,7 @@ impl<'a> PictureTask<'a> {
                 is_quick,
             ),
             curves: self.inspection.curves.clone(),
-            groups: Vec::new(),
+            groups: Arc::default(),
             rest: Arc::clone(&shared.throttle),
             request,
         });

@@ -44,7 +44,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
         counters: None,
         cache: Err(NoCache::Unasked),
         curves: [Vec::new(), Vec::new()],
-        groups: Vec::new(),
+        groups: Arc::default(),
         backdrop: None,
         cut_off: None,
         cached_seconds: 0.0,

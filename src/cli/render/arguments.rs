@@ -123,8 +123,9 @@ pub(in crate::cli) struct RenderArguments {
     /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
     #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto", help_heading = "Light")]
     pub(super) sharing: Sharing,
-    /// Renders sky, sun, each lamp by its name, and what surfaces emit by themselves: the picture is their sum, and
-    /// an .exr has a layer of each (light.sky, light.sun, ...). Samples and noise are those of each of them.
+    /// Renders groups of light apart: sky, sun, each lamp by its name, emissive surfaces. The picture is their sum, and
+    /// an .exr has a layer of each (light.sky, light.sun, lamp.NAME, light.surfaces). Samples and noise are asked of
+    /// each group; seconds are shared.
     #[arg(long, conflicts_with_all = ["part", "checkpoint", "distributions", "frames", "turntable"], help_heading = "Light")]
     pub(super) light_groups: bool,
     /// What becomes of light that has met several surfaces. Unless it is given: exact, with up to 16 samples of

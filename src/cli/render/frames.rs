@@ -119,10 +119,10 @@ pub(super) fn is_video(path: &Path) -> bool {
 
 /// What ffmpeg is told for a kind of video. Those of the first two have an even size.
 fn codec(path: &Path) -> Option<String> {
-    const EVEN: &str = "-pix_fmt yuv420p -vf crop=trunc(iw/2)*2:trunc(ih/2)*2";
+    const YUV_EVEN: &str = "-pix_fmt yuv420p -vf crop=trunc(iw/2)*2:trunc(ih/2)*2";
     Some(match extension(path)?.as_str() {
-        "mp4" => format!("-c:v libx264 -crf 16 {EVEN}"),
-        "webm" => format!("-c:v libvpx-vp9 -crf 24 -b:v 0 {EVEN}"),
+        "mp4" => format!("-c:v libx264 -crf 16 {YUV_EVEN}"),
+        "webm" => format!("-c:v libvpx-vp9 -crf 24 -b:v 0 {YUV_EVEN}"),
         "gif" => "-vf split[a][b];[a]palettegen[p];[b][p]paletteuse".to_owned(),
         _ => return None,
     })

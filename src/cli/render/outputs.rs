@@ -7,11 +7,12 @@ use super::{RenderArguments, frames};
 use crate::cli::picture::{check_output, say_written};
 use crate::error::{Error, Result};
 use crate::image::is_same_file;
-use crate::output::Films;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
+use crate::output::{Films, holds_layers};
 use crate::path::World;
 use crate::render::{Driver, Sampling, View};
+use crate::terminal::notice;
 
 /// Refuses outputs before the work rather than after it.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
@@ -54,6 +55,9 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
     }
     if arguments.part.is_none() {
         arguments.picture.say_unused(&arguments.outputs);
+    }
+    if arguments.light_groups && !arguments.outputs.iter().any(|path| holds_layers(path)) {
+        notice("--light-groups adds nothing: only .exr pictures have layers");
     }
     Ok(())
 }

@@ -29,7 +29,12 @@ pub(super) struct Sums<'a> {
 impl<'a> Sums<'a> {
     /// Of the one picture that there is, or of one for each group.
     pub(super) fn of(pictures: &'a [Traced<'_>], groups: &[LightGroup]) -> Self {
-        let films: Vec<_> = pictures.iter().map(|picture| picture.driver.film()).collect();
+        let mut films: Vec<_> = pictures.iter().map(|picture| picture.driver.film()).collect();
+        if !groups.is_empty() {
+            // Where one has no sample of a pixel, the light of the others is not lost.
+            let whole = |film: &Cow<'_, Film>| Cow::Owned(film.without_gaps().into_owned());
+            films = films.iter().map(whole).collect();
+        }
         let image = |(group, film): (&LightGroup, &Cow<'_, Film>)| GroupImage {
             name: group.name.clone(),
             factor: 1.0,
@@ -46,7 +51,11 @@ impl<'a> Sums<'a> {
         });
         let mut figures =
             pictures.first().map_or(Figures::default(), |it| it.driver.session.figures());
-        pictures.iter().skip(1).for_each(|it| figures.add(&it.driver.session.figures()));
+        for other in pictures.iter().skip(1) {
+            figures.add(&other.driver.session.figures());
+            // That of the sum is not known.
+            figures.variance_saved = 0.0;
+        }
         let cached_seconds = pictures.iter().map(|picture| picture.beside.seconds).sum();
         Self { film, cached, figures, cached_seconds, groups }
     }

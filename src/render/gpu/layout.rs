@@ -329,7 +329,8 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
         .enumerate()
         .map(|(index, m)| Material {
             base_color: m.base_color,
-            emissive: m.emissive,
+            // Of an unlit one it is a factor on what is seen.
+            emissive: if m.unlit { Vec3::ONE } else { m.emissive },
             alpha_cutoff: if let AlphaMode::Mask { cutoff } = m.alpha_mode { cutoff } else { 0.0 },
             specular_color: m.specular_color,
             specular: m.specular,

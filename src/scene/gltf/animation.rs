@@ -44,7 +44,8 @@ impl<'a> Channels<'a> {
                 let Checked::Valid(property) = channel.target.path else { continue };
                 if let Some(sampler) = animation.samplers.get(channel.sampler.value()) {
                     let target = (channel.target.node.value() as u32, property as u8);
-                    samplers.entry(target).or_insert_with(|| sampler.clone());
+                    let bare = || Sampler { extras: None, extensions: None, ..sampler.clone() };
+                    samplers.entry(target).or_insert_with(bare);
                 }
             }
         }

@@ -68,7 +68,7 @@ fn camera(
     world_from_camera: DAffine3,
     notices: &mut Notices,
 ) -> Camera {
-    let (usable, projection) = match (&source.perspective, &source.orthographic) {
+    let (size, projection) = match (&source.perspective, &source.orthographic) {
         (None, Some(parallel)) => {
             let height = Some(parallel.ymag.abs()).filter(|y| *y > 0.0 && y.is_finite());
             (height, Projection::Orthographic { half_height: height.unwrap_or(1.0) })
@@ -80,7 +80,7 @@ fn camera(
             (fov, Projection::Perspective { fov_y_radians })
         }
     };
-    if usable.is_none() || !world_from_camera.is_finite() {
+    if size.is_none() || !world_from_camera.is_finite() {
         notices.add(format!("camera {name} is damaged; the unusable values are replaced"));
     }
     let world_from_camera =
