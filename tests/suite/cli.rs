@@ -956,3 +956,43 @@ fn lamps_are_changed_by_name() {
     let says = bench.refusal(&line("-o b.exr --lamp key:watts=3"), 2);
     assert!(says.contains("watts is not factor, color or off"), "{says}");
 }
+
+/// Groups of light are layers that add up to the picture.
+#[test]
+fn light_groups_add_up_in_layers() {
+    let bench = Bench::new();
+    let line = "render evening --size 64x36 --device cpu --light-groups";
+    let output = bench.run(&format!("{line} --spp 2 -o g.exr -o g.png"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let read = |name: &str| {
+        let image = exr::prelude::read_all_flat_layers_from_file(bench.path(name)).expect("read");
+        let mut channels = std::collections::BTreeMap::new();
+        for layer in image.layer_data {
+            let before =
+                layer.attributes.layer_name.map_or(String::new(), |name| format!("{name}."));
+            for channel in layer.channel_data.list {
+                let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
+                channels.insert(format!("{before}{}", channel.name), values);
+            }
+        }
+        channels
+    };
+    let channels = read("g.exr");
+    for color in ["R", "G", "B"] {
+        let groups = ["light.sky", "light.sun", "light.surfaces"];
+        let of = |index: usize| groups.map(|group| channels[&format!("{group}.{color}")][index]);
+        for (index, whole) in channels[color].iter().enumerate() {
+            let sum: f32 = of(index).iter().sum();
+            assert!((sum - whole).abs() <= 1e-5 * whole.max(1e-3), "{index}: {sum} {whole}");
+        }
+    }
+    // Where time is too short for all pixels, no group's light is lost.
+    let output = bench.run(&format!("{line} --seconds 0.001 -o h.exr"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mean = |of: &[f32]| of.iter().sum::<f32>() / of.len() as f32;
+    let [long, short] = [&channels, &read("h.exr")].map(|of| mean(&of["light.surfaces.R"]));
+    assert!((short / long - 1.0).abs() < 0.3, "{short} {long}");
+    let says = text(&bench.run(&format!("{line} --spp 1 -o i.png")).stderr).to_owned();
+    assert!(says.contains("--light-groups adds nothing"), "{says}");
+    bench.refusal(&format!("{line} --part 1/2 -o a.part"), 2);
+}
