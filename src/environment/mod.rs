@@ -441,6 +441,7 @@ impl Environment {
     }
 
     /// Scaled importance at the corners of a patch.
+    #[inline]
     fn importances(&self, column: u32, row: u32) -> Corners<f32> {
         self.corner_pixels(column, row).map(|pixel| self.importances[pixel])
     }

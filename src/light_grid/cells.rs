@@ -48,6 +48,7 @@ impl SphericalGrid {
         self.cell_on_face(position, if self.faces && self.medium { MEDIUM_FACE } else { 0 })
     }
 
+    #[inline]
     fn cell_on_face(&self, position: Vec3, face: u32) -> u32 {
         // Not normalised: only its angles are used.
         let uv = uv_from_direction(position - self.center);

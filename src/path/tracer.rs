@@ -578,6 +578,7 @@ impl<'a> Path<'a> {
 
     /// With which probability the path has survived; `None` if it has not. By throughput, as it would
     /// be in air: refraction into a body is no loss.
+    #[inline]
     pub(super) fn survival(&mut self) -> Option<f32> {
         let is_young = self.bounces + self.interfaces < limits::ROULETTE_AFTER;
         if !self.tracer.limits.russian_roulette || is_young {

@@ -99,6 +99,7 @@ impl Scatterer<'_> {
     }
 
     /// Where a ray from `position` in this direction begins.
+    #[inline]
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
         match self {
             Self::Surface(surface) => surface.sides.origin_toward(position, direction),

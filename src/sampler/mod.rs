@@ -126,6 +126,7 @@ impl Sampler {
     }
 
     /// The next pair in `[0,1)`.
+    #[inline]
     pub fn next_pair(&mut self) -> [f32; 2] {
         self.next_pair_bits().map(unit_from_bits)
     }

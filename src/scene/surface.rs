@@ -222,6 +222,7 @@ impl Sides {
     }
 
     /// Where a ray in this direction begins that leaves the point at `position`.
+    #[inline]
     pub fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
         let normal = self.geometric_normal;
         if self.lifts(direction) {
