@@ -79,10 +79,10 @@ impl<'a> MixTask<'a> {
         }
         while self.sessions.watch.takes_up_latest() {
             let activity = self.activity(&pictures);
-            // Other factors before anything else.
-            self.publish_if_due(activity, &pictures);
             let shows_cached = self.sessions.watch.request.wants_cached;
             if matches!(activity, Activity::Learning(_) | Activity::Rendering) {
+                // Other factors before anything else.
+                self.publish_if_due(activity, &pictures);
                 let next = pictures.iter_mut().min_by_key(|picture| picture.samples(shows_cached));
                 next.into_iter().for_each(|picture| self.advance(picture, may_cache));
             } else if self.settle(&mut pictures) {
