@@ -20,8 +20,7 @@ const PERIOD: Duration = Duration::from_millis(500);
 /// Length and time of the last change; `None` of a file that is not there.
 type Stamp = Option<(u64, SystemTime)>;
 
-/// What the thread is told of the scene or the map: the files that are looked at from now on, or `None` if those that
-/// are looked at were read.
+/// Files of the scene or the map to look at from now on; `None` after those that are looked at were read.
 type News = (Kind, Option<Vec<PathBuf>>);
 
 /// Looks at files, and says whose have changed.

@@ -36,7 +36,7 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Starts the application without a display, in a window of so many pixels; [`Start::is_repeatable`] is set.
+    /// Starts the application without a display, in a window of this size in pixels; sets [`Start::is_repeatable`].
     /// `patience` is the longest wait for the samples.
     ///
     /// # Errors

@@ -161,8 +161,8 @@ impl Job<'_> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
         // Were there no memory any more when it is finished, the picture would be lost.
-        let spare: Vec<u8> =
-            memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
+        let [film_bytes, spare_bytes] = needed_bytes(arguments);
+        let spare: Vec<u8> = memory::reserved(spare_bytes).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
         let mut groups = Vec::new();
         let mut each = vec![((world, environment), view.clone())];
@@ -172,11 +172,11 @@ impl Job<'_> {
             let views = (0..).zip(&groups).map(of_group);
             let lit = groups.iter().map(|group| (world, &group.environment));
             each = lit.zip(views).collect();
+            // Each has a film, one of cached light, and a layer.
+            memory::check(3 * groups.len() as u64 * film_bytes)
+                .map_err(|cause| too_large(&cause))?;
         }
         let count = each.len();
-        // Each has a film, one of cached light, and a layer.
-        memory::check(3 * count as u64 * needed_bytes(arguments)[0] * u64::from(count > 1))
-            .map_err(|cause| too_large(&cause))?;
         let seconds = arguments.seconds.map(|seconds| seconds / count as f64);
         let of_each = RenderArguments { seconds, ..arguments.clone() };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());

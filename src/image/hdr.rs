@@ -231,7 +231,7 @@ fn text_line(rest: &mut &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
 }
 
-/// Takes so many bytes off what is left of the file.
+/// Takes the next `count` bytes of the file.
 fn take<'a>(rest: &mut &'a [u8], count: usize) -> Decoded<&'a [u8]> {
     rest.split_off(..count).ok_or_else(|| "is cut short".into())
 }

@@ -1,4 +1,4 @@
-//! What is known of a surface: look-up in the trained cache.
+//! Look-up of a surface's radiance in the trained cache.
 
 use glam::Vec3;
 

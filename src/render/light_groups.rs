@@ -12,7 +12,7 @@ use crate::environment::Environment;
 use crate::image::Image;
 use crate::path::{Background, LightChoice, Lit, World};
 use crate::scene::needs::SceneFeatures;
-use crate::scene::{LampEdits, PunctualLight};
+use crate::scene::{LampEdit, LampEdits, PunctualLight};
 
 /// Most lamps, by their names, that a mix has room for: each has a film.
 pub(crate) const MAX_LAMPS: usize = 16;
@@ -52,7 +52,7 @@ pub(crate) struct LightFactors {
 impl LightFactors {
     fn of_lamp(&self, name: &str) -> f32 {
         let edit = self.lamp_edits.get(name);
-        self.lamps * edit.map_or(1.0, |edit| if edit.off { 0.0 } else { edit.factor })
+        self.lamps * edit.map_or(1.0, LampEdit::brightness)
     }
 
     /// All lights inside a scene times their factors.
@@ -172,7 +172,7 @@ mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::render::gpu::{Gpu, UploadedScene};
     use crate::render::{Phase, Session, Sharing};
-    use crate::scene::{LampEdit, PunctualKind, builtin};
+    use crate::scene::{PunctualKind, builtin};
 
     /// A room with emissive surfaces, a lamp of one name and two of another, under a sky with a sun.
     fn room() -> (World, Environment) {

@@ -29,12 +29,16 @@ impl LampEdit {
     /// Largest factor that can be asked for.
     pub const MAX_FACTOR: f32 = 1e6;
 
+    /// Factor on their intensity, 0 where they are off.
+    pub(crate) fn brightness(&self) -> f32 {
+        if self.off { 0.0 } else { self.factor }
+    }
+
     /// The light changed.
     pub fn apply(&self, light: &PunctualLight) -> PunctualLight {
-        let factor = if self.off { 0.0 } else { self.factor };
         let max = light.intensity.max_element();
         let intensity = self.color.and_then(brightest).map_or(light.intensity, |color| color * max);
-        PunctualLight { intensity: intensity * factor, ..light.clone() }
+        PunctualLight { intensity: intensity * self.brightness(), ..light.clone() }
     }
 
     /// This change and then another one.

@@ -72,7 +72,7 @@ const MAX_METHODS: usize = 40;
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11629),
+    ("app", 11625),
     ("bench", 465),
     ("bsdf", 1476),
     ("bvh", 1386),
@@ -101,7 +101,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6554),
     ("report", 2947),
     ("sampler", 144),
-    ("scene", 9792),
+    ("scene", 9794),
     ("shaders", 6187),
     ("sources", 133),
     ("stability", 1807),

@@ -132,8 +132,8 @@ impl<'a> MixTask<'a> {
         }
     }
 
-    /// Whether the sum of so many exact samples has no more noise than this; it is found out anew where they are a
-    /// sixteenth more.
+    /// Whether the noise of the sum is at most `limit`. It is measured again when `exact`, the samples that all groups
+    /// have, has grown by a sixteenth.
     fn has_noise_below(&mut self, limit: f64, exact: u32, pictures: &[GroupPicture<'_>]) -> bool {
         let (of, _, factors) = &self.noise;
         let mix = &self.sessions.watch.request.mix;
@@ -189,7 +189,8 @@ impl<'a> MixTask<'a> {
         let (shared, request) =
             (self.sessions.watch.shared, Arc::clone(&self.sessions.watch.request));
         let (mix, Some(first)) = (request.mix.as_ref(), pictures.first()) else { return };
-        let film = Arc::new(mixed(&films(pictures, mix, |picture| Some(picture.main.film()))));
+        let exact = films(pictures, mix, |picture| Some(picture.main.film()));
+        let film = Arc::new(mixed(&exact));
         let cached = films(pictures, mix, GroupPicture::cached_film);
         let cached =
             (cached.len() == pictures.len() && request.wants_cached).then(|| mixed(&cached));
@@ -199,16 +200,12 @@ impl<'a> MixTask<'a> {
             worth: worth(&film, &cached, errors.as_ref()),
             film: Arc::new(cached),
         });
-        let figures = |figures: &dyn Fn(&GroupPicture<'_>) -> Figures| {
-            let mut all = Figures::default();
-            pictures.iter().for_each(|picture| all.add(&figures(picture)));
-            all
-        };
-        let of_main = figures(&|picture| picture.main.figures());
+        let mut figures = Figures::default();
+        pictures.iter().for_each(|picture| figures.add(&picture.main.figures()));
         let main = SessionSnapshot {
             sampling: request.view.sampling,
             samples: film.min_samples(),
-            figures: Figures { samples: film.total_samples(), ..of_main },
+            figures: Figures { samples: film.total_samples(), ..figures },
             comparable_seconds: None,
             noise: film.noise(),
             invalid_samples: film.invalid_samples(),
@@ -223,7 +220,6 @@ impl<'a> MixTask<'a> {
             factor,
             image: film.image(),
         };
-        let exact = films(pictures, mix, |picture| Some(picture.main.film()));
         let groups = pictures.iter().zip(exact).map(image).collect();
         let lit = (self.sessions.world, &*request.environment);
         let cut_off = match main.samples {
