@@ -9,6 +9,9 @@ struct Second {
     what: u32,
     position: vec3f,
     geometric_normal: vec3f,
+//#if AIMING
+    triangle: u32,
+//#end
 //#if LIFTED
     lift: f32,
 //#end
@@ -78,7 +81,18 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
 //#end
     }
     let area = cosine / squared;
-    let density = f.pdf_solid_angle * area / f32(OWNER_SIDE * OWNER_SIDE);
+    var pdf = f.pdf_solid_angle;
+//#if AIMING
+    if may_aim(path, vertex) {
+        if is_in_medium {
+            pdf *= 1.0 - globals.aim_probability;
+        } else {
+            let triangle = batch[index].triangle;
+            pdf = aiming_pdf(receiver_of(vertex), triangle, direction, sqrt(squared), pdf);
+        }
+    }
+//#end
+    let density = pdf * area / f32(OWNER_SIDE * OWNER_SIDE);
 //#if MEDIUM
     let way = fog_stretch(vertex.point.position, direction, sqrt(squared));
     let flown = crossing(way.interior, carried, max(way.end - way.start, 0.0), is_in_medium);
@@ -228,6 +242,9 @@ fn connect_seconds(
                     surface_at(found.x, bitcast<vec2f>(found.yz), float3(seconds[second_at_ + 1u]));
                 batch[lane].position = point.position;
                 batch[lane].geometric_normal = point.geometric_normal;
+//#if AIMING
+                batch[lane].triangle = point.triangle;
+//#end
 //#if LIFTED
                 batch[lane].lift = point.lift;
 //#end

@@ -63,6 +63,10 @@ fn learn(
     }
     var path = path_anywhere(offset, LEARNING_SEED);
     path.is_counted = true;
-    while path_step(&path) {}
+    // Not in the condition; see train.wgsl.
+    var goes_on = true;
+    while goes_on {
+        goes_on = path_step(&path);
+    }
     atomicAdd(&learning_rays, path.rays);
 }

@@ -111,7 +111,12 @@ fn begin_estimate(group: u32, lane: u32) {
     if scatter(&path, vertex) {
         survival_ = survival(&path);
     }
+//#if AIMING
+    let may_aim_ = select(1.0, 1.0 - globals.aim_probability, path.aim != NO_AIM);
+    let density = path.departure_pdf_solid_angle * may_aim_;
+//#else
     let density = path.departure_pdf_solid_angle;
+//#end
     path.throughput_before *= max_element(path.throughput) / max(survival_, 1e-30);
     path.throughput = vec3f(1.0);
 //#if MAP_SAMPLING

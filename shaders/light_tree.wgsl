@@ -73,15 +73,36 @@ fn choose_light(receiver: Receiver, bits: u32) -> LightChoice {
         }
     }
 //#end
-    var node = 0u;
+    let light = descend_lights(0u, receiver, &draw);
+    return LightChoice(light, interval_probability(draw.left), draw_remainder(draw));
+}
+
+// Chooses a light of the tree with this root.
+fn descend_lights(root: u32, receiver: Receiver, draw: ptr<function, Draw>) -> u32 {
+    var node = root;
     var link = light_link(node);
     while (link & LIGHT_LEAF) == 0u {
         let share = share_of_first(node, link, receiver);
-        node = select(link, node + 1u, draw_chooses_first(&draw, share));
+        node = select(link, node + 1u, draw_chooses_first(draw, share));
         link = light_link(node);
     }
-    return LightChoice(link & ~LIGHT_LEAF, interval_probability(draw.left), draw_remainder(draw));
+    return link & ~LIGHT_LEAF;
 }
+
+//#if AREA_SOURCES
+// What is left of an interval where the tree with this root leads to a leaf.
+fn choose_leaf(root: u32, leaf: u32, before: Interval, receiver: Receiver) -> Interval {
+    var chosen = before;
+    var node = root;
+    while node != leaf {
+        let second = light_link(node);
+        let first = leaf < second;
+        chosen = interval_choose(chosen, share_of_first(node, second, receiver), first);
+        node = select(second, node + 1u, first);
+    }
+    return chosen;
+}
+//#end
 
 //#if EMITTERS
 // Probability with which `choose_light` chooses an emissive triangle, counted among such.
@@ -93,13 +114,6 @@ fn light_probability(receiver: Receiver, light: u32) -> f32 {
         chosen = interval_choose(chosen, lights(distant_light_at(i)).x, false);
     }
 //#end
-    var node = 0u;
-    while node != leaf {
-        let second = light_link(node);
-        let first = leaf < second;
-        chosen = interval_choose(chosen, share_of_first(node, second, receiver), first);
-        node = select(second, node + 1u, first);
-    }
-    return interval_probability(chosen);
+    return interval_probability(choose_leaf(0u, leaf, chosen, receiver));
 }
 //#end

@@ -28,14 +28,10 @@ fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
 //#end
     var none: LightSample;
 //#if EMITTERS
-    let u = vec2f(choice.remainder, unit_from_bits(bits.y));
-    let root = sqrt(u.x);
-    let barycentric = vec2f(root * (1.0 - u.y), root * u.y);
+    let barycentric = barycentric_of(vec2f(choice.remainder, unit_from_bits(bits.y)));
     let triangle = lights(choice.light).x;
     let corners = light_corners(triangle);
-    let target_ = corners[0] + (corners[1] - corners[0]) * barycentric.x
-        + (corners[2] - corners[0]) * barycentric.y;
-    let to_light = target_ - receiver.position;
+    let to_light = place_on(corners, barycentric) - receiver.position;
     let distance = length(to_light);
     let direction = to_light / distance;
     let pdf = probability * area_to_solid_angle(corners, direction, distance * distance);
@@ -49,7 +45,18 @@ fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
 //#end
 }
 
-//#if EMITTERS
+//#if AREA_SOURCES
+// Uniform barycentric coordinates: weights of the second and third corner.
+fn barycentric_of(u: vec2f) -> vec2f {
+    let root = sqrt(u.x);
+    return vec2f(root * (1.0 - u.y), root * u.y);
+}
+
+fn place_on(corners: array<vec3f, 3>, barycentric: vec2f) -> vec3f {
+    return corners[0] + (corners[1] - corners[0]) * barycentric.x
+        + (corners[2] - corners[0]) * barycentric.y;
+}
+
 fn light_corners(triangle: u32) -> array<vec3f, 3> {
     let corners = triangles(triangle).xyz;
     return array<vec3f, 3>(
@@ -67,6 +74,26 @@ fn area_to_solid_angle(corners: array<vec3f, 3>, direction: vec3f, squared: f32)
     return select(0.0, density, is_finite(density));
 }
 
+// Number of a triangle among `count` ascending ones; `count` or more if it is none of them.
+fn index_of_triangle(at: u32, count: u32, triangle: u32) -> u32 {
+    var low = 0u;
+    var high = count;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if lights(at + middle).x < triangle {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    if low < count && lights(at + low).x != triangle {
+        return count;
+    }
+    return low;
+}
+//#end
+
+//#if EMITTERS
 // Density with which a triangle's point along `direction` is chosen; zero if it is no light.
 fn local_light_pdf_solid_angle(
     triangle: u32,
@@ -74,24 +101,12 @@ fn local_light_pdf_solid_angle(
     direction: vec3f,
     distance: f32,
 ) -> f32 {
-    if globals.light_triangle_count == 0u {
-        return 0.0;
-    }
-    var low = 0u;
-    var high = globals.light_triangle_count - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if lights(middle).x < triangle {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    if lights(low).x != triangle {
+    let index = index_of_triangle(0u, globals.light_triangle_count, triangle);
+    if index >= globals.light_triangle_count {
         return 0.0;
     }
     let density = area_to_solid_angle(light_corners(triangle), direction, distance * distance);
-    return light_probability(receiver, low) * density;
+    return light_probability(receiver, index) * density;
 }
 
 // Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.

@@ -10,8 +10,12 @@ struct Path {
     // it), tile distribution, and what lights are chosen for.
     departure_pdf_solid_angle: f32,
     departure_distribution: u32,
-//#if EMITTERS
+//#if AREA_SOURCES
     departure_receiver: Receiver,
+//#end
+//#if AIMING
+    // Whether the ray was aimed at a translucent surface; see aim.wgsl.
+    aim: u32,
 //#end
 //#if CLEAR_SOLIDS
     // The ray as it left, and whether smooth glass has refracted it since.
@@ -170,6 +174,11 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
                 stretch.interior, (*path).throughput, stretch.end - stretch.start, bits);
             (*path).throughput *= flight.weight;
             if flight.scattered_at < F32_MAX {
+//#if AIMING
+                if is_aimed(path) {
+                    return false;
+                }
+//#end
                 let position =
                     (*path).ray.origin + (*path).ray.direction * (stretch.start + flight.scattered_at);
                 return visit(path, medium_vertex(path, position, stretch.interior.mean_cosine));
@@ -186,6 +195,11 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     if has_faded(path) {
         return false;
     }
+//#if AIMING
+    if hit.t >= MISS && is_aimed(path) {
+        return false;
+    }
+//#end
     if hit.t >= MISS {
         escape(path);
         return false;
@@ -197,13 +211,24 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     let direction = (*path).ray.direction;
     let point = surface_at(hit.triangle, hit.barycentric, direction);
 //#if EMITTERS
+//#if AIMING
+    if !is_aimed(path) {
+        add_emitted(path, point);
+    }
+//#else
     add_emitted(path, point);
+//#end
 //#end
 //#if PARTIAL
     if passes(path, point) {
         (*path).ray.origin = offset_origin(point.position, -point.geometric_normal);
         (*path).passes += 1u;
         return (*path).passes < MAX_PASSES;
+    }
+//#end
+//#if AIMING
+    if !arrives_as_aimed(path, point) {
+        return false;
     }
 //#end
     return arrive(path, point);
@@ -417,7 +442,7 @@ fn forget_arrival(path: ptr<function, Path>) {
 //#else
     (*path).departure_pdf_solid_angle = 0.0;
     (*path).departure_distribution = 0u;
-//#if EMITTERS
+//#if AREA_SOURCES
     (*path).departure_receiver = Receiver();
 //#end
 //#end
@@ -501,7 +526,7 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         (*path).departure_pdf_solid_angle =
             phase_pdf_solid_angle(vertex.mean_cosine, dot(travel, turned_));
         (*path).departure_distribution = vertex.distribution;
-//#if EMITTERS
+//#if AREA_SOURCES
         (*path).departure_receiver = receiver_of(vertex);
 //#end
 //#if SHARING
@@ -515,9 +540,14 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return true;
     }
 //#end
+//#if AIMING
+    let choice = path_pair(path);
+    let sample = sample_aiming(path, vertex, choice, path_pair_bits(path));
+//#else
     let lobe = path_pair(path).x;
     let u = path_pair(path);
     let sample = bsdf_sample(vertex.bsdf, vertex.wo, vec3f(lobe, u));
+//#end
     if all(sample.weight == vec3f(0.0)) {
         return false;
     }
@@ -553,7 +583,7 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#end
     (*path).departure_pdf_solid_angle = select(sample.pdf_solid_angle, F32_MAX, sample.is_delta);
     (*path).departure_distribution = vertex.distribution;
-//#if EMITTERS
+//#if AREA_SOURCES
     (*path).departure_receiver = receiver_of(vertex);
 //#end
 //#if SHARING

@@ -140,10 +140,13 @@ fn read_path(slot: u32) -> Path {
     path.map_samples = 1.0;
     path.departure_map_samples = 1.0;
 //#end
-//#if EMITTERS
+//#if AREA_SOURCES
     let position = slot_read(slot, RECEIVER_TEXEL);
     let normal = slot_read(slot, RECEIVER_TEXEL + 1u);
     path.departure_receiver = Receiver(float3(position), float3(normal));
+//#if AIMING
+    path.aim = position.w;
+//#end
 //#end
 //#if CLEAR_SOLIDS
     let departure_origin = slot_read(slot, DEPARTURE_TEXEL);
@@ -192,9 +195,13 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     // Its ray has hit nothing yet.
     slot_write(slot, HIT, vec3f((*path).throughput_before, 0.0, 0.0), 0u);
 //#end
-//#if EMITTERS
+//#if AREA_SOURCES
     let receiver = (*path).departure_receiver;
-    slot_write(slot, RECEIVER_TEXEL, receiver.position, 0u);
+    var aim = 0u;
+//#if AIMING
+    aim = (*path).aim;
+//#end
+    slot_write(slot, RECEIVER_TEXEL, receiver.position, aim);
     slot_write(slot, RECEIVER_TEXEL + 1u, receiver.normal, 0u);
 //#end
 //#if CLEAR_SOLIDS

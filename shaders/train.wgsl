@@ -145,7 +145,11 @@ fn train(
         training_vertices[i].slot = NO_CACHE_SLOT;
     }
     var path = path_anywhere(offset, TRAINING_SEED);
-    while path_step(&path) {}
+    // Where the call is the condition itself, Mesa 22.3 adds light of some paths twice.
+    var goes_on = true;
+    while goes_on {
+        goes_on = path_step(&path);
+    }
     for (var i = 0u; i < TRAINING_VERTICES; i++) {
         end_training_vertex(&path, i);
     }

@@ -7,16 +7,14 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::light_tree::{Light, LightTree, Moments, Receiver};
+use super::translucent::TranslucentSurfaces;
+use super::triangles::{area_to_solid_angle, facing, point_on, relate, solid_angle_pdf};
 use crate::bsdf;
 use crate::bvh::Hit;
 use crate::color::importance;
-use crate::sampler::unit_from_bits;
 use crate::scene::needs::is_emitter;
 use crate::scene::surface::SurfacePoint;
 use crate::scene::{PunctualKind, PunctualLight, Scene};
-
-/// Least intensity of a light relative to that of all.
-const MIN_INTENSITY: f32 = 1e-30;
 
 /// A sampled point on a light, seen from a shading point.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +40,8 @@ pub struct LocalLights {
     pub(crate) punctual: Vec<PunctualLight>,
     /// How lights are chosen.
     pub(crate) tree: LightTree,
+    /// Surfaces that paths aim at beside them; `None` where that gains nothing.
+    pub(crate) translucent: Option<Box<TranslucentSurfaces>>,
 }
 
 /// Which lights inside a scene count, and how much.
@@ -114,7 +114,7 @@ impl LocalLights {
         }
         relate(&mut lights);
         let tree = LightTree::new(lights, total, &distant, triangles.len());
-        Self { triangles, punctual, tree }
+        Self { triangles, punctual, tree, translucent: None }
     }
 
     /// Whether there is nothing to sample.
@@ -143,11 +143,7 @@ impl LocalLights {
             return sample_punctual(light, receiver.position, probability);
         };
         let corners = scene.corners(triangle);
-        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
-        let barycentric = sample_triangle(u);
-        let target = corners[0]
-            + (corners[1] - corners[0]) * barycentric.x
-            + (corners[2] - corners[0]) * barycentric.y;
+        let (target, barycentric) = point_on(&corners, choice.remainder, bits[1]);
         let to_light = target - receiver.position;
         let distance = to_light.length();
         let direction = to_light / distance;
@@ -173,19 +169,13 @@ impl LocalLights {
         direction: Vec3,
         distance: f32,
     ) -> f32 {
-        let Ok(index) = self.triangles.binary_search(&triangle) else { return 0.0 };
-        let corners = scene.corners(triangle);
-        area_to_solid_angle(&corners, direction, distance * distance)
-            .map_or(0.0, |density| self.tree.probability(receiver, index as u32) * density)
-    }
-}
-
-/// Divides the lights' intensities by their sum, which need not be what f32 can hold.
-fn relate(lights: &mut [Light]) {
-    let total: f64 = lights.iter().map(|light| f64::from(light.moments.intensity)).sum();
-    for light in lights {
-        let share = f64::from(light.moments.intensity) / total;
-        light.moments.intensity = (share as f32).max(MIN_INTENSITY);
+        solid_angle_pdf(
+            (&self.triangles, &self.tree),
+            scene,
+            triangle,
+            receiver,
+            (direction, distance),
+        )
     }
 }
 
@@ -204,21 +194,6 @@ pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>, to_viewer: Vec3) 
     emitted * bsdf::left_by_coat(parameters, point.front_face, wo)
 }
 
-/// Uniform barycentric coordinates (weights of the second and third corner) of a triangle.
-fn sample_triangle(u: Vec2) -> Vec2 {
-    let root = u.x.sqrt();
-    Vec2::new(root * (1.0 - u.y), root * u.y)
-}
-
-/// Density in solid angle of a uniform point on a triangle.
-fn area_to_solid_angle(corners: &[Vec3; 3], direction: Vec3, squared: f32) -> Option<f32> {
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    // |normal| is twice the area, so that area * |cos| = |normal . direction| / 2.
-    let projected_area = 0.5 * normal.dot(direction).abs();
-    let density = squared / projected_area;
-    (density.is_finite() && density > 0.0).then_some(density)
-}
-
 /// Moments and power of an emissive triangle; `None` if nothing comes from it.
 fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
     let corners = scene.corners(triangle);
@@ -235,16 +210,7 @@ fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
         .sum::<f32>()
         / probes.len() as f32;
     let intensity = (area * (probed + 0.02 * importance(material.emissive))).min(f32::MAX);
-    let center = (corners[0] + corners[1] + corners[2]) / 3.0;
-    let variance = corners.iter().map(|c| c.distance_squared(center)).sum::<f32>() / 12.0;
-    let place = Moments {
-        intensity,
-        center,
-        variance,
-        axis: normal.normalize_or_zero(),
-        aimed: 1.0,
-        around: 0.0,
-    };
+    let place = facing(&corners, intensity);
     // What shines on both sides shines half as much in a mean direction as along its normal.
     let (moments, sides) = if material.double_sided {
         (Moments { axis: Vec3::ZERO, aimed: 0.0, around: 0.5, ..place }, 2.0)

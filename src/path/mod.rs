@@ -8,6 +8,7 @@
 //! straight through, by paths and shadow rays alike, and are no vertices: so NEE and BSDF sampling see
 //! the same light behind a pane. Smooth solid glass refracts both (`shadows`).
 
+mod aim;
 pub mod background;
 mod body;
 pub(crate) mod cached;
@@ -27,6 +28,8 @@ pub mod sharing;
 pub(crate) mod splitting;
 mod tracer;
 pub(crate) mod train;
+pub(crate) mod translucent;
+mod triangles;
 mod vertex;
 mod world;
 mod world_builder;

@@ -22,6 +22,7 @@ use glam::Vec3;
 use super::shadows::SHADOW_RAY_SHARE;
 use super::splitting::{MIN_SHARED_ALPHA, MIN_WHOLE_ALPHA, UseOfVertices};
 use super::tracer::{Path, PathResult, PathTracer};
+use super::translucent::TranslucentSurfaces;
 use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
@@ -93,6 +94,8 @@ pub(crate) const TILE_SEED: u32 = 0x7469_6c65;
 struct First<'v> {
     vertex: Vertex<'v>,
     throughput: Vec3,
+    /// What its pixel may have aimed at.
+    translucent: Option<&'v TranslucentSurfaces>,
 }
 
 /// A second vertex that is shared.
@@ -139,7 +142,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
             } else {
                 path.use_of_vertices = UseOfVertices::alone(start.tracer.cache.is_some());
             }
-            let throughput = path.throughput;
+            let (throughput, translucent) = (path.throughput, path.tracer.translucent_for(&vertex));
             if path.visit(&vertex)
                 && let is_lifted = vertex.scatterer.lifts(path.ray.direction)
                 && let Some(second) = path.next_vertex(second_bsdf)
@@ -152,7 +155,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
                     seconds.push(Second { owner, vertex: second, path: path.clone() });
                 }
             }
-            first = shares.then_some(First { vertex, throughput });
+            first = shares.then_some(First { vertex, throughput, translucent });
         }
         results.push(path.result());
         firsts.push(first);
@@ -288,7 +291,8 @@ impl Path<'_> {
             if !onward.is_some_and(|onward| self.go_on(vertex, &onward)) {
                 continue;
             }
-            let density = self.departure.pdf_solid_angle;
+            let density =
+                self.departure.pdf_solid_angle * self.departure.probability_of_bsdf(self.tracer);
             let direction = self.ray.direction;
             let weight = self.throughput;
             let Some(survival) = self.survival() else { continue };
@@ -356,7 +360,8 @@ impl Second<'_, '_> {
             let Some(first) = first else { continue };
             let to_second = position - first.vertex.position;
             let squared = to_second.length_squared();
-            let direction = to_second / squared.sqrt();
+            let distance = squared.sqrt();
+            let direction = to_second / distance;
             let cosine = match scatterer {
                 Scatterer::Surface(surface) => -surface.sides.geometric_normal.dot(direction),
                 Scatterer::Medium(_) => 1.0,
@@ -370,6 +375,18 @@ impl Second<'_, '_> {
             }
             let scattered = first.vertex.scatterer.scattered(direction);
             let Some((f, pdf_solid_angle)) = scattered else { continue };
+            let pdf_solid_angle = match (first.translucent, scatterer) {
+                (Some(translucent), Scatterer::Surface(surface)) => {
+                    let at = (surface.triangle, distance);
+                    let receiver = first.vertex.receiver();
+                    let scene = &tracer.world.scene;
+                    translucent.pdf_solid_angle(scene, at, &receiver, direction, pdf_solid_angle)
+                }
+                (Some(translucent), Scatterer::Medium(_)) => {
+                    translucent.probability_of_bsdf() * pdf_solid_angle
+                }
+                (None, _) => pdf_solid_angle,
+            };
             let carried = first.throughput * f;
             if carried.max_element() <= 0.0 {
                 continue;
@@ -384,7 +401,7 @@ impl Second<'_, '_> {
                 }
             }
             let crossing = tracer.fog.as_ref().map_or(Crossing::CLEAR, |fog| {
-                let stretch = fog.stretch(first.vertex.position, direction, squared.sqrt());
+                let stretch = fog.stretch(first.vertex.position, direction, distance);
                 let length = stretch.map_or(0.0, |(from, to)| to - from);
                 fog.interior.crossing(carried, length, is_in_medium)
             });

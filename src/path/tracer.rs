@@ -11,7 +11,7 @@ use super::lights::{self, LocalLights};
 use super::limits::{self, CutOff, MAX_INTERFACES, PathLimits};
 use super::looks::{FirstHit, Looks};
 use super::splitting::{MIN_NARROW, MIN_SHARED_NARROW, UseOfVertices};
-use super::vertex::{MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex};
+use super::vertex::{Aim, MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex};
 use super::world::World;
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
@@ -121,6 +121,8 @@ pub(super) struct Departure {
     pub(super) map_samples: u32,
     /// Whether smooth glass has refracted it since.
     pub(super) is_refracted: bool,
+    /// Whether the ray was aimed at a translucent surface.
+    pub(super) aim: Aim,
 }
 
 /// Where a ray is not passed on straight.
@@ -168,6 +170,7 @@ impl<'a> Path<'a> {
             distribution: WHOLE_MAP,
             map_samples: 1,
             is_refracted: false,
+            aim: Aim::None,
         };
         Self {
             tracer,
@@ -326,21 +329,27 @@ impl<'a> Path<'a> {
             self.rays += 1;
             let hit = self.tracer.world.closest_hit(&self.ray, self.is_of_camera());
             if let Some(vertex) = self.fly(hit.map_or(f32::INFINITY, |hit| hit.t)) {
-                return Some(Arrival::InMedium(vertex));
+                return (!self.departure.is_aimed()).then_some(Arrival::InMedium(vertex));
             }
             if self.has_faded() {
                 return None;
             }
             let Some(hit) = hit else {
-                self.escape();
+                if !self.departure.is_aimed() {
+                    self.escape();
+                }
                 return None;
             };
             self.travelled += hit.t;
             let point = self.tracer.world.point(&hit, self.ray.direction);
-            if self.tracer.world.needs.has(SceneFeatures::EMITTERS) {
+            if self.tracer.world.needs.has(SceneFeatures::EMITTERS) && !self.departure.is_aimed() {
                 self.add_emitted(&hit, &point);
             }
             if !self.passes(&point) {
+                if self.departure.aim != Aim::None {
+                    self.throughput *= self.departure.weight_at(&point, self.tracer)?;
+                    self.departure.aim = Aim::None;
+                }
                 return Some(Arrival::AtSurface(point));
             }
             self.ray.origin = offset_origin(point.position, -point.geometric_normal);
@@ -449,6 +458,7 @@ impl<'a> Path<'a> {
         let material = self.tracer.world.material(point.material);
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
+            triangle: point.triangle,
             sides: Sides::of(point),
             shading_frame: point.shading_frame,
             bsdf: bsdf.viewed_from(wo),
@@ -525,6 +535,13 @@ impl<'a> Path<'a> {
     pub(super) fn choose_onward(&mut self, vertex: &Vertex<'_>) -> Option<Onward> {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => {
+                let translucent = self.tracer.translucent_for(vertex);
+                if let Some(translucent) = translucent.filter(|_| self.is_in_air()) {
+                    let choice = self.sampler.next_pair();
+                    let bits = self.sampler.next_pair_bits();
+                    let scene = &self.tracer.world.scene;
+                    return translucent.onward(scene, vertex, surface, choice, bits);
+                }
                 let lobe = if surface.bsdf().is_lambert {
                     self.sampler.skip(1);
                     0.0
@@ -564,6 +581,7 @@ impl<'a> Path<'a> {
             distribution: vertex.distribution,
             map_samples: self.map_samples,
             is_refracted: false,
+            aim: onward.aim,
         };
         self.map_samples = 1;
         true

@@ -20,6 +20,11 @@ pub(super) struct Vertex<'v> {
 }
 
 impl Vertex<'_> {
+    /// Whether light comes through a surface there.
+    pub(super) fn transmits(&self) -> bool {
+        matches!(&self.scatterer, Scatterer::Surface(surface) if surface.transmits)
+    }
+
     /// What lights are chosen for. What lets light through is lit from behind as well.
     pub(super) fn receiver(&self) -> Receiver {
         let normal = match &self.scatterer {
@@ -40,6 +45,18 @@ pub(super) struct Arriving {
     pub(super) light: Vec3,
 }
 
+/// Whether a ray was aimed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Aim {
+    /// It could not be.
+    #[default]
+    None,
+    /// It could have been, but was not.
+    Free,
+    /// At this triangle.
+    At(u32),
+}
+
 /// What scatters light at a vertex.
 pub(super) enum Scatterer<'v> {
     Surface(SurfaceScatterer<'v>),
@@ -54,6 +71,7 @@ pub(super) struct MediumScatterer {
 }
 
 pub(super) struct SurfaceScatterer<'v> {
+    pub(super) triangle: u32,
     /// Above is where the path came from.
     pub(super) sides: Sides,
     pub(super) shading_frame: Frame,
@@ -113,7 +131,7 @@ impl MediumScatterer {
     pub(super) fn onward(&self, u: Vec2) -> Onward {
         let direction = self.phase.sample(self.travel, u).normalize();
         let pdf_solid_angle = self.pdf_solid_angle(direction);
-        Onward { direction, weight: Vec3::ONE, pdf_solid_angle, is_through: false }
+        Onward { direction, weight: Vec3::ONE, pdf_solid_angle, is_through: false, aim: Aim::None }
     }
 
     fn pdf_solid_angle(&self, direction: Vec3) -> f32 {
@@ -150,6 +168,7 @@ impl<'v> SurfaceScatterer<'v> {
             weight: sample.weight,
             pdf_solid_angle,
             is_through,
+            aim: Aim::None,
         })
     }
 }
@@ -164,4 +183,6 @@ pub(super) struct Onward {
     pub(super) pdf_solid_angle: f32,
     /// Whether it goes through the surface.
     pub(super) is_through: bool,
+    /// Whether the direction was aimed.
+    pub(super) aim: Aim,
 }

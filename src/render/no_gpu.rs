@@ -10,7 +10,7 @@ use crate::bvh::Ray;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::{Lit, World};
+use crate::path::{Lit, LocalLights, World};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
 pub(crate) use super::gpu_facts::Question;
@@ -113,7 +113,7 @@ pub(crate) enum DeviceFilm {}
 pub(crate) enum Renderer {}
 
 never! { uploaded; impl Renderer {
-    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: &View, _: bool) -> Result<Self>;
+    pub(crate) fn new(uploaded: &UploadedScene, _: Lit<'_>, _: (&View, Option<&LocalLights>), _: bool) -> Result<Self>;
 } }
 
 /// Traces rays alone on a device.

@@ -3,13 +3,14 @@
 use glam::Vec2;
 use rayon::prelude::*;
 
-use super::view::View;
+use super::view::{Sampling, View};
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
+use crate::light_grid::LightGrid;
 use crate::math::Frame;
 use crate::path::camera::CameraRays;
 use crate::path::limits::{CutOff, MAX_INTERFACES};
-use crate::path::{Lit, World};
+use crate::path::{Lit, LocalLights, PathLimits, PathTracer, World};
 use crate::sampler::Sampler;
 
 /// Rays along each axis of the picture.
@@ -77,6 +78,51 @@ fn cut_off(lit: Lit<'_>, view: &View) -> CutOff {
     CutOff { by_bounces: mean(|cut| cut.by_bounces), by_interfaces: mean(|cut| cut.by_interfaces) }
 }
 
+/// Paths from each place of the picture that look for translucent surfaces.
+const LOOKS_THROUGH: u32 = 2;
+/// Least share of the light that must come from translucent surfaces to be aimed at.
+const MIN_TRANSLUCENT: f32 = 0.1;
+/// Probability of aiming at them over that share, and the maximum: the rest is found by the other paths alone.
+const AIM_OF_SHARE: f32 = 0.7;
+const MAX_AIM: f32 = 0.5;
+
+/// The lights inside the scene that count, with translucent surfaces to be aimed at if they bring enough of the light;
+/// `None` are all of the world. NEE goes by these distributions.
+pub(super) fn lights_of(
+    lit: Lit<'_>,
+    view: &View,
+    grid: Option<&LightGrid>,
+) -> Option<LocalLights> {
+    let chosen = view.chosen_lights(lit.0);
+    if view.sampling != Sampling::Adaptive || view.limits.bounces < 2 {
+        return chosen;
+    }
+    let lights = chosen.as_ref().unwrap_or(&lit.0.lights);
+    let limits = PathLimits { bounces: view.limits.bounces.min(4), ..view.limits };
+    let tracer = PathTracer { lights, limits, layers: false, ..view.tracer(lit, grid) };
+    let Some(translucent) = tracer.translucent_surfaces() else { return chosen };
+    let mut aiming = LocalLights { translucent: Some(Box::new(translucent)), ..lights.clone() };
+    let tracer = PathTracer { lights: &aiming, ..tracer };
+    let size @ [width, height] = view.whole_size();
+    let rays = CameraRays::new(&view.camera, width, height);
+    let places: Vec<Vec2> = places(size).collect();
+    let of_path = |index: u32| {
+        let place = places[(index / LOOKS_THROUGH) as usize];
+        tracer.light_of_translucent(rays.ray(place, Vec2::ZERO), Sampler::new(SEED, index, 7))
+    };
+    let of_paths: Vec<[f32; 2]> =
+        (0..LOOKS_THROUGH * places.len() as u32).into_par_iter().map(of_path).collect();
+    let [from_them, all] = [0, 1].map(|i| of_paths.iter().map(|light| light[i]).sum::<f32>());
+    let share = from_them / all;
+    if share.is_nan() || share < MIN_TRANSLUCENT {
+        return chosen;
+    }
+    if let Some(translucent) = &mut aiming.translucent {
+        translucent.aim_probability = (AIM_OF_SHARE * share).min(MAX_AIM);
+    }
+    Some(aiming)
+}
+
 /// A sentence where paths end with much of their light left, unless direct light alone is asked for.
 pub(crate) fn cut_off_notice(lit: Lit<'_>, view: &View) -> Option<String> {
     if view.limits.bounces <= 1 {
@@ -111,14 +157,132 @@ fn places([width, height]: [u32; 2]) -> impl Iterator<Item = Vec2> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use glam::Vec3;
 
     use super::*;
-    use crate::environment::{Environment, EnvironmentOptions};
+    use crate::environment::{Environment, EnvironmentOptions, sky};
     use crate::image::Image;
     use crate::path::{PathLimits, WorldBuilder};
+    use crate::render::film::{Film, Pixel};
+    use crate::render::filter::PixelFilter;
+    use crate::render::gpu::{Gpu, UploadedScene};
+    use crate::render::{Gi, Phase, Session, Sharing};
     use crate::scene::{Camera, Material};
+
+    /// Cloth, and glass that spreads what it lets through.
+    pub(in crate::render) fn translucent_materials() -> [Material; 2] {
+        let cloth = Material { diffuse_transmission: 0.6, ..Material::lambert(0.8) };
+        let frosted =
+            Material { roughness: 0.3, transmission: 1.0, thickness: 0.1, ..Material::default() };
+        [cloth, frosted]
+    }
+
+    /// A room whose window is shut by such a material, its map, and a view that does not see the window.
+    pub(in crate::render) fn shut_room(material: &Material) -> (World, Environment, View) {
+        let grey = Material::lambert(0.6);
+        let [low, high] = [Vec3::new(-2.0, -1.5, -2.0), Vec3::new(2.0, 1.5, 2.0)];
+        let [shut_low, shut_high] = [Vec3::new(-0.5, -0.4, 2.05), Vec3::new(0.5, 0.6, 2.1)];
+        let mut room =
+            WorldBuilder::default().faces(&grey, low, high, 0..4).face(&grey, low, high, 5);
+        // What is left of the wall with the window.
+        for (corner, size) in [
+            ([-2.0, -1.5], [1.5, 3.0]),
+            ([0.5, -1.5], [1.5, 3.0]),
+            ([-0.5, -1.5], [1.0, 1.1]),
+            ([-0.5, 0.6], [1.0, 0.9]),
+        ] {
+            let corner = Vec3::from((corner[0], corner[1], 2.0));
+            room = room.quad(&grey, corner, Vec3::X * size[0], Vec3::Y * size[1]);
+        }
+        let has_inside = material.has_inside();
+        let faces = if has_inside { 0..6 } else { 4..5 };
+        let world = room.faces(material, shut_low, shut_high, faces).build();
+        let map = sky::build("day", 64, 32).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let camera = Camera::look_at(Vec3::new(0.0, 0.0, 1.5), Vec3::NEG_Z, 1.0);
+        let view = View {
+            filter: PixelFilter::Box,
+            sharing: Sharing::Off,
+            learning_paths: 1 << 12,
+            limits: PathLimits { bounces: 5, ..PathLimits::default() },
+            ..View::new(camera, [32, 24])
+        };
+        (world, environment, view)
+    }
+
+    fn rendered(lit: Lit<'_>, view: View, samples: u32, gpu: Option<&Gpu>) -> Film {
+        let uploaded = gpu.map(|gpu| UploadedScene::new(gpu, lit.0, lit.1).expect("uploaded"));
+        let mut session = Session::on(lit, view, uploaded.as_ref()).expect("begun");
+        while session.phase() == Phase::Learning || session.samples() < samples {
+            session.advance(samples, &AtomicBool::new(false)).expect("rendered");
+        }
+        session.film().clone()
+    }
+
+    /// Mean luminance and its variance.
+    fn mean(film: &Film) -> [f64; 2] {
+        let count = film.pixels().len() as f64;
+        let sum = |of: &dyn Fn(&Pixel) -> f64| film.pixels().iter().map(of).sum::<f64>();
+        [sum(&Pixel::mean_luminance) / count, sum(&Pixel::variance_of_mean) / (count * count)]
+    }
+
+    #[test]
+    fn paths_aim_where_light_comes_through_scattered() {
+        let probability = |material: &Material, map: &Environment| {
+            let (world, _, view) = shut_room(material);
+            let lights = lights_of((&world, map), &view, None)?;
+            lights.translucent.map(|translucent| translucent.aim_probability)
+        };
+        let [cloth, frosted] = translucent_materials();
+        let (_, map, _) = shut_room(&cloth);
+        for material in [&cloth, &frosted] {
+            let found = probability(material, &map);
+            assert!(found.is_some_and(|found| (0.25..=MAX_AIM).contains(&found)), "{found:?}");
+        }
+        let clear = Material { roughness: 0.0, ..frosted.clone() };
+        assert_eq!(probability(&clear, &map), None, "shadow rays follow it");
+        let mut dark = map.clone();
+        dark.set_intensity(0.0);
+        assert_eq!(probability(&cloth, &dark), None, "no light comes through");
+    }
+
+    #[test]
+    fn aiming_changes_the_noise_alone_on_both_devices() {
+        for material in translucent_materials() {
+            let (world, environment, view) = shut_room(&material);
+            let lit = (&world, &environment);
+            let by_bsdf = View { sampling: Sampling::Plain, seed: 3, ..view.clone() };
+            let expected = mean(&rendered(lit, by_bsdf, 1024, None));
+            let assert_agrees = |view: View, gpu: Option<&Gpu>| {
+                let what = format!("{:?}, on a GPU: {}", view.sharing, gpu.is_some());
+                let [found, variance] = mean(&rendered(lit, view, 64, gpu));
+                let z = (found - expected[0]) / (variance + expected[1]).sqrt();
+                // Pixels that share are not independent.
+                assert!(z.abs() < 6.0, "{what}: {found} and {expected:?}, {z} standard errors");
+                variance
+            };
+            let plain =
+                mean(&rendered(lit, View { sampling: Sampling::Plain, ..view.clone() }, 64, None));
+            let aimed = assert_agrees(view.clone(), None);
+            // What is left of frosted glass's is sunlight that it spreads.
+            assert!(aimed < 0.8 * plain[1], "{aimed} {plain:?}");
+            let shared = View { sharing: Sharing::Large, ..view.clone() };
+            assert_agrees(shared.clone(), None);
+            #[cfg(feature = "gpu")]
+            if let Some(gpu) = Gpu::for_test() {
+                assert_agrees(view.clone(), Some(&gpu));
+                assert_agrees(shared, Some(&gpu));
+                let cached = View { gi: Gi::Cached, ..view };
+                let [[on_cpu, _], [on_gpu, _]] =
+                    [None, Some(&gpu)].map(|gpu| mean(&rendered(lit, cached.clone(), 256, gpu)));
+                assert!((on_cpu / on_gpu - 1.0).abs() < 0.02, "{on_cpu} {on_gpu}");
+            }
+        }
+    }
 
     #[test]
     fn a_closed_room_says_what_the_maximum_of_bounces_takes() {

@@ -59,7 +59,7 @@ pub(in super::super) struct Moments {
 
 impl Moments {
     /// Those of both.
-    pub(super) fn with(&self, other: &Self) -> Self {
+    pub(in super::super) fn with(&self, other: &Self) -> Self {
         let intensity = self.intensity + other.intensity;
         let share = other.intensity / intensity;
         let between = other.center - self.center;
@@ -84,6 +84,13 @@ impl Moments {
 }
 
 impl Node {
+    /// The same where so many nodes of another tree are before those of its own.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn moved(&self, by: u32) -> Self {
+        let link = if self.link & LEAF == 0 { self.link + by } else { self.link };
+        Self { link, ..*self }
+    }
+
     pub(super) fn new(moments: &Moments, link: u32) -> Self {
         let Moments { intensity, center, variance, axis, aimed, around } = *moments;
         let (aimed_squared, axis_squared) = (aimed * aimed, axis.length_squared());

@@ -42,7 +42,7 @@ impl Caster {
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(uploaded: &UploadedScene, lit: Lit<'_>, view: &View) -> Result<Self> {
-        Dispatcher::new(uploaded, lit, view).map(Self)
+        Dispatcher::new(uploaded, lit, view, view.chosen_lights(lit.0).as_ref()).map(Self)
     }
 
     /// Uploads rays to be traced; they begin where they say, whatever their `t_min`.

@@ -23,7 +23,7 @@ use super::uploaded_scene::{UploadedScene, put_array, put_lights};
 use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::{Lit, World};
+use crate::path::{Lit, LocalLights, World};
 use crate::scene::needs::SceneFeatures;
 
 /// Tiles of a dispatch that keep a software device's cores busy.
@@ -47,7 +47,8 @@ pub(super) struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// Uploads what a view needs beside scene and map; no kernel is compiled yet.
+    /// Uploads what a view needs beside scene and map, and the lights that count if not all do as they came with the
+    /// scene; no kernel is compiled yet.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
@@ -55,6 +56,7 @@ impl Dispatcher {
         uploaded: &UploadedScene,
         (world, environment): Lit<'_>,
         view: &View,
+        lights: Option<&LocalLights>,
     ) -> Result<Self> {
         features::check(view)?;
         let gpu = uploaded.buffers.gpu.clone();
@@ -78,7 +80,7 @@ impl Dispatcher {
             compile_seconds: 0.0,
         };
         dispatcher.put_tables(view, environment)?;
-        dispatcher.put_lights(view, world)?;
+        dispatcher.put_lights(view, world, lights)?;
         let buffers = &mut dispatcher.buffers;
         if features.view.contains(ViewFeatures::COUNTING) {
             // Until there is something to count.
@@ -91,13 +93,19 @@ impl Dispatcher {
         Ok(dispatcher)
     }
 
-    /// Uploads the lights inside the scene that count, unless all do: these came with the scene.
-    fn put_lights(&mut self, view: &View, world: &World) -> Result<()> {
-        let Some(lights) = view.chosen_lights(world) else { return Ok(()) };
+    /// Uploads these lights.
+    fn put_lights(
+        &mut self,
+        view: &View,
+        world: &World,
+        lights: Option<&LocalLights>,
+    ) -> Result<()> {
+        let Some(lights) = lights else { return Ok(()) };
         let Self { buffers, globals, features, .. } = self;
         features.view.set(ViewFeatures::LOCAL_LIGHTS, !lights.is_empty());
+        features.view.set(ViewFeatures::AIMING, lights.translucent.is_some());
         if features.scene_lights() {
-            put_lights(buffers, globals, &lights)?;
+            put_lights(buffers, globals, lights)?;
         }
         if !view.local_lights.has_surfaces() {
             let (mut materials, _) = layout::materials(world);

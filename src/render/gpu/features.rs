@@ -45,6 +45,8 @@ bitflags::bitflags! {
         const RECORD_RATIO = 1 << 13;
         /// The share is weighted by the cosine.
         const RECORD_COSINE = 1 << 14;
+        /// Paths aim at translucent surfaces.
+        const AIMING = 1 << 15;
     }
 }
 
@@ -108,9 +110,11 @@ pub(super) fn check(view: &View) -> Result<()> {
 pub(super) type Condition = fn(&Features) -> bool;
 
 /// What follows from the others, by name.
-const DERIVED: [(&str, Condition); 13] = {
+const DERIVED: [(&str, Condition); 14] = {
     use {SceneFeatures as S, ViewFeatures as V};
     [
+        // Triangles are chosen as lamps are.
+        ("AREA_SOURCES", Features::area_sources),
         // Some hits of closest-hit rays do not count.
         ("FILTERED_HITS", |f| f.scene.intersects(S::ALPHA_MASK | S::SINGLE_SIDED)),
         ("FILTERED_OR_PASSED", Features::filtered_or_passed),
@@ -258,9 +262,14 @@ impl Features {
         self.scene.contains(SceneFeatures::CLEAR_SOLIDS) || self.scene.pass_through()
     }
 
-    /// Lights that are not the map.
+    /// Lights that are not the map, or what is chosen like them.
     pub(super) fn scene_lights(&self) -> bool {
-        self.scene.intersects(SceneFeatures::EMITTERS | SceneFeatures::PUNCTUAL_LIGHTS)
+        self.area_sources() || self.scene.contains(SceneFeatures::PUNCTUAL_LIGHTS)
+    }
+
+    /// Triangles are chosen as lamps are: emissive or translucent ones.
+    pub(super) fn area_sources(&self) -> bool {
+        self.scene.contains(SceneFeatures::EMITTERS) || self.view.contains(ViewFeatures::AIMING)
     }
 
     /// There are shadow rays.

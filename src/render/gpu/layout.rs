@@ -13,6 +13,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::medium::{Fog, Phase};
 use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
+use crate::path::light_tree::Node;
 use crate::path::{LocalLights, World};
 use crate::radiance_cache::CacheCells;
 use crate::scene::surface::absorption;
@@ -100,6 +101,10 @@ pub(crate) struct Globals {
     pub(crate) cache_least_distance: f32,
     pub(crate) first_of_instances: u32,
     pub(crate) slot_log2: u32,
+    pub(crate) translucent_at: u32,
+    pub(crate) translucent_count: u32,
+    pub(crate) translucent_root: u32,
+    pub(crate) aim_probability: f32,
     pub(crate) padding_0: u32,
     pub(crate) padding_1: u32,
 }
@@ -408,7 +413,7 @@ pub(super) const PUNCTUAL_WORDS: usize = 16;
 
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u32> {
-    let LocalLights { triangles, punctual, tree } = lights;
+    let LocalLights { triangles, punctual, tree, translucent } = lights;
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;
     let mut words = [triangles.as_slice(), &tree.leaves].concat();
@@ -430,7 +435,25 @@ pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u3
         }
         words.extend(record);
     }
+    globals.translucent_at = words.len() as u32;
+    if let Some(translucent) = translucent {
+        globals.translucent_count = translucent.triangles.len() as u32;
+        globals.translucent_root = tree.nodes.len() as u32;
+        globals.aim_probability = translucent.aim_probability;
+        words.extend(&translucent.triangles);
+        words.extend(translucent.tree.leaves.iter().map(|leaf| leaf + globals.translucent_root));
+    }
     words
+}
+
+/// Nodes of the lights' tree, and of that of translucent surfaces behind it.
+pub(crate) fn light_nodes(lights: &LocalLights) -> Vec<Node> {
+    let mut nodes = lights.tree.nodes.clone();
+    let root = nodes.len() as u32;
+    if let Some(translucent) = &lights.translucent {
+        nodes.extend(translucent.tree.nodes.iter().map(|node| node.moved(root)));
+    }
+    nodes
 }
 
 /// Three 18-bit mantissas and a common exponent, twin of `unpack_radiance` in `environment.wgsl`.

@@ -67,6 +67,7 @@ pub(super) mod tests {
     use super::*;
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{DistributionOptions, LightGrid};
+    use crate::path::Lit;
     use crate::path::PathTracer;
     use crate::path::camera::CameraRays;
     use crate::radiance_cache::RadianceCache;
@@ -75,7 +76,8 @@ pub(super) mod tests {
     use crate::render::gi::tests::view;
     use crate::render::gpu::tests::crack;
     use crate::render::gpu::{Gpu, Renderer, UploadedScene};
-    use crate::render::{Gi, Pass, View, cpu};
+    use crate::render::view_probe::tests::{shut_room, translucent_materials};
+    use crate::render::{Gi, Pass, View, cpu, view_probe};
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
     /// distributions of the first, and a rendering pass of which a third is counted, if rendered paths count.
@@ -98,7 +100,7 @@ pub(super) mod tests {
         let never = AtomicBool::new(false);
         let mut renderer = gpu.map(|gpu| {
             let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&uploaded, (&world, &environment), &view, true).expect("it fits")
+            Renderer::new(&uploaded, (&world, &environment), (&view, None), true).expect("it fits")
         });
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
@@ -171,15 +173,28 @@ pub(super) mod tests {
     fn both_devices_train_the_same() {
         let Some(gpu) = Gpu::for_test() else { return };
         let (world, environment) = crack();
-        let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
-        let training =
-            || CacheTraining::new((&world, &environment), &view).expect("there is light");
+        let view = view(&world, DistributionOptions::ADAPTIVE);
+        train_the_same(&gpu, (&world, &environment), view);
+        for material in translucent_materials() {
+            let (world, environment, view) = shut_room(&material);
+            train_the_same(&gpu, (&world, &environment), view);
+        }
+    }
+
+    fn train_the_same(gpu: &Gpu, (world, environment): Lit<'_>, view: View) {
+        let view = View { gi: Gi::Cached, ..view };
+        let training = || CacheTraining::new((world, environment), &view).expect("there is light");
         let distributions = LightGrid::whole_map(environment.tile_energies());
         let (on_cpu, on_gpu) = (training(), training());
-        let tracer = view.tracer((&world, &environment), distributions.as_ref());
-        let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
+        let lights = view_probe::lights_of((world, environment), &view, distributions.as_ref());
+        let tracer = PathTracer {
+            lights: lights.as_ref().unwrap_or(&world.lights),
+            ..view.tracer((world, environment), distributions.as_ref())
+        };
+        let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
         let mut renderer =
-            Renderer::new(&uploaded, (&world, &environment), &view, true).expect("it fits");
+            Renderer::new(&uploaded, (world, environment), (&view, lights.as_ref()), true)
+                .expect("it fits");
         renderer.set_grid(distributions.as_ref()).expect("uploaded");
         let never = AtomicBool::new(false);
         let mut known = None;

@@ -47,7 +47,7 @@ use super::film::Film;
 use super::{Advance, Pass, View};
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::Lit;
+use crate::path::{Lit, LocalLights};
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 #[cfg(feature = "window")]
 pub(crate) use background_compile::MaybeReady;
@@ -118,17 +118,18 @@ pub(crate) struct Renderer {
 }
 
 impl Renderer {
-    /// Builds the kernels for a view of what is uploaded, with that for learning if the session `learns`.
+    /// Builds the kernels for a view of what is uploaded, with that for learning if the session `learns`. The view is asked
+    /// for with the lights inside the scene that count; `None` are those that are uploaded.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(
         uploaded: &UploadedScene,
         lit: Lit<'_>,
-        view: &View,
+        asked: (&View, Option<&LocalLights>),
         learns: bool,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, asked)?;
         let kernels = renderer.own_kernels(learns);
         renderer.dispatcher.compile(&kernels)?;
         Ok(renderer)
@@ -143,11 +144,11 @@ impl Renderer {
     pub(crate) fn new_or_held(
         uploaded: &UploadedScene,
         lit: Lit<'_>,
-        view: &View,
+        asked: (&View, Option<&LocalLights>),
         learns: bool,
         until_then: impl FnOnce() -> Arc<CompileGuard>,
     ) -> Result<MaybeReady<Self>> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, asked)?;
         let kernels = renderer.own_kernels(learns);
         let on = &mut renderer.dispatcher;
         match on.gpu.pipelines_or_held(on.programs(&kernels), until_then)? {
@@ -167,7 +168,7 @@ impl Renderer {
         view: &View,
         compile: impl FnOnce(&Gpu, shader::Program) -> Result<Arc<kernel_cache::Pipeline>>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view)?;
+        let mut renderer = Self::without_kernels(uploaded, lit, (view, None))?;
         let on = &mut renderer.dispatcher;
         let program = on.programs(&[Kernel::Render]).remove(0).1;
         on.take_up(&[Kernel::Render], vec![compile(&on.gpu, program)?]);
@@ -175,8 +176,12 @@ impl Renderer {
     }
 
     /// All but its kernels.
-    fn without_kernels(uploaded: &UploadedScene, lit: Lit<'_>, view: &View) -> Result<Self> {
-        let mut on = Dispatcher::new(uploaded, lit, view)?;
+    fn without_kernels(
+        uploaded: &UploadedScene,
+        lit: Lit<'_>,
+        (view, lights): (&View, Option<&LocalLights>),
+    ) -> Result<Self> {
+        let mut on = Dispatcher::new(uploaded, lit, view, lights)?;
         let (size, scale) = ([view.width, view.height], on.globals.film_scale);
         let mut renderer = Self {
             film: Sums::new(&mut on.buffers, size, view.layers, scale)?,
@@ -399,7 +404,7 @@ pub(super) mod tests {
         let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
         let begin = || {
-            let renderer = Renderer::new(&uploaded, (&world, &environment), &view, true);
+            let renderer = Renderer::new(&uploaded, (&world, &environment), (&view, None), true);
             let mut renderer = renderer.expect("it fits");
             renderer.set_grid(grid.as_ref()).expect("uploaded");
             renderer

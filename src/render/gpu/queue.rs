@@ -147,7 +147,7 @@ mod tests {
         grid: Option<&LightGrid>,
     ) -> Film {
         let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
-        let renderer = Renderer::new(&uploaded, (world, environment), view, true);
+        let renderer = Renderer::new(&uploaded, (world, environment), (view, None), true);
         let mut renderer = renderer.expect("it fits");
         if let Rendering::Queue(queue) = &mut renderer.rendering {
             queue.groups = 7;

@@ -241,7 +241,7 @@ impl Program {
 }
 
 /// The files before that of the entry point, callees before callers, and whether each is needed.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 57] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -253,6 +253,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
     let has_instances = scene.contains(SceneFeatures::INSTANCES);
     let samples_map = view.contains(ViewFeatures::MAP_SAMPLING);
     let has_shadow_rays = features.shadow_rays();
+    let tells_lobes = ViewFeatures::RADIANCE_CACHE | ViewFeatures::AIMING;
     [
         (wgsl!("globals"), true),
         (wgsl!("math"), true),
@@ -285,6 +286,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
         (wgsl!("draw"), features.scene_lights()),
         (wgsl!("light_tree"), features.scene_lights()),
         (wgsl!("lights"), features.scene_lights()),
+        (wgsl!("aim"), view.contains(ViewFeatures::AIMING)),
         (wgsl!("medium"), view.contains(ViewFeatures::MEDIUM)),
         (wgsl!("bvh"), true),
         (wgsl!("levels"), has_instances && features.software_walk()),
@@ -300,7 +302,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
         (wgsl!("shadows"), has_shadow_rays),
         (wgsl!("gather"), has_shadow_rays && kernel != Kernel::Learn),
         (wgsl!("no_lights"), !has_shadow_rays && kernel != Kernel::Learn),
-        (wgsl!("lobes"), kernel.shares() || view.contains(ViewFeatures::RADIANCE_CACHE)),
+        (wgsl!("lobes"), kernel.shares() || view.intersects(tells_lobes)),
         (wgsl!("radiance_cache"), view.contains(ViewFeatures::RADIANCE_CACHE)),
         (wgsl!("count"), view.contains(ViewFeatures::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),

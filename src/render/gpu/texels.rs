@@ -36,7 +36,8 @@ pub(crate) struct SlotTexels {
 }
 
 impl SlotTexels {
-    pub(crate) fn of(Features { scene, view, kernel }: Features) -> Self {
+    pub(crate) fn of(features: Features) -> Self {
+        let Features { scene, view, kernel } = features;
         let mut count = 7;
         let mut next = |is_needed, texels| {
             let at = count;
@@ -52,7 +53,7 @@ impl SlotTexels {
         let waits = |light| view.contains(light) && !kernel.contains(KernelFeatures::SHARING);
         let is_solid = scene.contains(SceneFeatures::SOLID_TRANSMISSION);
         let parts = [
-            ("RECEIVER_TEXEL", next(scene.contains(SceneFeatures::EMITTERS), 2)),
+            ("RECEIVER_TEXEL", next(features.area_sources(), 2)),
             ("BODY_TEXEL", next(is_solid, body_texels)),
             ("FIRST_HIT_TEXEL", next(view.contains(ViewFeatures::LAYERS), looks)),
             ("MAP_SHADOW_TEXEL", next(waits(ViewFeatures::MAP_SAMPLING), of_map)),

@@ -184,7 +184,7 @@ pub(super) fn put_lights(
 ) -> Result<()> {
     let words = layout::light_words(lights, globals);
     put_array(buffers, "lights", "the list of lights", &words)?;
-    put_array(buffers, "light_nodes", "the tree of lights", &lights.tree.nodes)
+    put_array(buffers, "light_nodes", "the tree of lights", &layout::light_nodes(lights))
 }
 
 /// Makes an array of values that take whole texels or parts of one.

@@ -26,7 +26,7 @@ use state::Spent;
 use super::film::Film;
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
 use super::pass::{Coverage, Pass};
-use super::{Figures, Phase, View, cpu, gpu};
+use super::{Figures, Phase, View, cpu, gpu, view_probe};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
@@ -51,7 +51,7 @@ impl<'a> Session<'a> {
         let tiles = Tiles::new((world, environment), &view);
         let training = CacheTraining::new((world, environment), &view);
         let state = SessionState {
-            lights: view.chosen_lights(world),
+            lights: view_probe::lights_of((world, environment), &view, tiles.grid()),
             view,
             film: HostFilm::new(),
             samples: 0,
@@ -159,7 +159,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let renderer = gpu::Renderer::new(uploaded, lit, &self.state.view, learns)?;
+        let renderer = gpu::Renderer::new(uploaded, lit, self.state.asked(), learns)?;
         self.move_to(renderer)
     }
 
@@ -175,7 +175,7 @@ impl<'a> Session<'a> {
         until_then: impl FnOnce() -> Arc<gpu::CompileGuard>,
     ) -> Result<Option<Weak<gpu::CompileGuard>>> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        match gpu::Renderer::new_or_held(uploaded, lit, &self.state.view, learns, until_then)? {
+        match gpu::Renderer::new_or_held(uploaded, lit, self.state.asked(), learns, until_then)? {
             gpu::MaybeReady::CompileGuard(held) => Ok(Some(held)),
             gpu::MaybeReady::Ready(renderer) => self.move_to(renderer).map(|()| None),
         }

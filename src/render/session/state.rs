@@ -52,6 +52,11 @@ impl SessionState {
         PathTracer { lights, counts, cache, ..self.view.tracer(lit, self.tiles.grid()) }
     }
 
+    /// The view, and the lights inside the scene that count; `None` are all.
+    pub(super) fn asked(&self) -> (&View, Option<&LocalLights>) {
+        (&self.view, self.lights.as_ref())
+    }
+
     /// Notes seconds of rendering and the samples taken in them.
     pub(super) fn spend(&mut self, seconds: f64, samples: u64) {
         self.figures.render_seconds += seconds;
