@@ -120,8 +120,5 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         say_written(file);
     }
     print(bench.to_string().trim_end())?;
-    match interrupt.was_signalled() {
-        true => Err(Error::new("stopped before the end")),
-        false => Ok(()),
-    }
+    if interrupt.was_signalled() { Err(Error::new("stopped before the end")) } else { Ok(()) }
 }

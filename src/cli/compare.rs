@@ -53,8 +53,5 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
 
 /// The picture in a file, or that of the film in it, and whether it is radiance, as films are.
 fn read(path: &Path) -> Result<(Image, bool)> {
-    match is_film(path) {
-        true => Ok((read_film(path)?.1.image(), true)),
-        false => read_with_linearity(path),
-    }
+    if is_film(path) { Ok((read_film(path)?.1.image(), true)) } else { read_with_linearity(path) }
 }

@@ -77,10 +77,7 @@ impl PictureArguments {
     pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
         pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
         if self.denoise == Some(Denoise::Off) && self.denoises_linear() {
-            let option = match self.rgb {
-                LinearRgb::Denoised => "--rgb",
-                LinearRgb::Rendered => "--layers",
-            };
+            let option = if self.rgb == LinearRgb::Denoised { "--rgb" } else { "--layers" };
             return Err(Error::new(format!(
                 "{option} denoised wants a denoiser: it cannot be --denoise off"
             )));

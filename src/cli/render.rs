@@ -227,7 +227,7 @@ impl Job<'_> {
         let films = Films { film, cached, denoised: None, groups: &sums.groups };
         let mut failures = outputs::write(&arguments, assignment, driver, &record, films);
         // Another device may have taken over.
-        assignment.set_metadata(record.metadata());
+        assignment.metadata = record.metadata();
         failures.extend(assignment.keep(driver).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
@@ -260,7 +260,7 @@ impl Job<'_> {
         let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), notices);
-        assignment.set_metadata(record.metadata());
+        assignment.metadata = record.metadata();
         let mut cpu = TakeOver { choice: arguments.device, notices };
         let begun = counted.map_or(Ok(()), |counted| {
             let taken_up = driver.session.continue_learning(counted);
@@ -313,14 +313,14 @@ impl Job<'_> {
         let mut failures = Vec::new();
         let mut known = Known::default();
         let mut progress = Progress::start("");
-        for number in frames.numbers() {
+        for number in frames.numbers.clone() {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
             of_frame.json = arguments.json.as_ref().map(name);
             of_frame.distributions = arguments.distributions.as_ref().map(name);
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
-            progress = progress.of_frame(number, *frames.numbers().end());
+            progress = progress.of_frame(number, *frames.numbers.end());
             let camera = frames.camera(number, camera);
             // What one frame cannot be written to may take the next.
             match self.render(&of_frame, camera, Some(&mut known), &progress) {

@@ -313,11 +313,7 @@ impl RenderArguments {
     /// The medium the options ask for: what they leave out is the scene's.
     fn medium(&self, scene: &Scene) -> Option<Medium> {
         let Self { fog, fog_absorption, fog_anisotropy, fog_box, .. } = self;
-        if fog.is_none()
-            && fog_absorption.is_none()
-            && fog_anisotropy.is_none()
-            && fog_box.is_none()
-        {
+        if (fog, fog_absorption, fog_anisotropy, fog_box) == (&None, &None, &None, &None) {
             return None;
         }
         let frame = scene.frame;

@@ -19,7 +19,8 @@ use crate::system::set_apart;
 
 /// Which pictures are asked for, and where the camera is in each.
 pub(super) struct Frames<'a> {
-    numbers: RangeInclusive<u32>,
+    /// Numbers of the pictures.
+    pub(super) numbers: RangeInclusive<u32>,
     motion: Motion<'a>,
     frames_per_second: f64,
 }
@@ -70,11 +71,6 @@ impl<'a> Frames<'a> {
             return Err(Error::new("--part and --checkpoint are of one frame, such as --frames 3"));
         }
         Ok(Some(Self { numbers, motion, frames_per_second: arguments.fps }))
-    }
-
-    /// Numbers of the pictures.
-    pub(super) fn numbers(&self) -> RangeInclusive<u32> {
-        self.numbers.clone()
     }
 
     /// Where the camera is in a frame: at `frame / fps` seconds, or so much of a turn further.

@@ -40,8 +40,8 @@ pub(super) struct RenderJob {
     wants_distributions: bool,
     /// See [`FilmFacts::picture`].
     picture: Vec<(String, String)>,
-    /// What checkpoints hold as [`FilmFacts::metadata`].
-    metadata: Vec<(String, String)>,
+    /// What checkpoints hold as [`FilmFacts::metadata`]: what their pictures say about themselves.
+    pub(super) metadata: Vec<(String, String)>,
 }
 
 struct Checkpoint {
@@ -82,10 +82,7 @@ impl RenderJob {
             checkpoint: None,
             wants_distributions: arguments.distributions.is_some(),
             // It takes a look at all of the scene and the map.
-            picture: match is_kept {
-                true => identity(arguments, lit, view),
-                false => Vec::new(),
-            },
+            picture: if is_kept { identity(arguments, lit, view) } else { Vec::new() },
             metadata: Vec::new(),
         };
         if let Some(path) = &arguments.checkpoint {
@@ -142,11 +139,6 @@ impl RenderJob {
             let more = if is_more { ", which is more than is asked for" } else { "" };
             say(notices, format!("{path}: goes on from {samples} samples a pixel{more}"));
         }
-    }
-
-    /// What pictures of its checkpoints are to say about themselves.
-    pub(super) fn set_metadata(&mut self, metadata: Vec<(String, String)>) {
-        self.metadata = metadata;
     }
 
     /// What drives a session to this part's samples.
