@@ -170,10 +170,7 @@ fn read(file: &Path) -> Result<KeptPicture> {
     if !(document.is_sound() && settings_file::is_within_bounds(&document)) {
         return Err(Error::at(file, "its settings are out of bounds"));
     }
-    let of_scene = match text(OF_SCENE) {
-        Ok(text) => serde_json::from_str(text).map_err(not_understood)?,
-        Err(_) => SceneOptions::default(),
-    };
+    let of_scene = text(OF_SCENE).map_or(Ok(SceneOptions::default()), serde_json::from_str);
     // A program that has had the file in its hands may have left none, or a large one.
     let is_small = |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH;
     let small = read_exr_preview(file)?.filter(is_small);
@@ -183,7 +180,7 @@ fn read(file: &Path) -> Result<KeptPicture> {
         summary: text(SUMMARY)?.to_owned(),
         pixels: Arc::new(Pixels::of_file(file.to_owned())),
         document,
-        of_scene,
+        of_scene: of_scene.map_err(not_understood)?,
         small: small.unwrap_or_else(grey),
         texture: None,
         file: Some(file.to_owned()),

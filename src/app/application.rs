@@ -201,7 +201,7 @@ impl App {
             let status = panels::status::Status {
                 rendering: &self.rendering,
                 shown: self.display.shown.as_deref(),
-                loading: self.assets.loading().next(),
+                loading: self.assets.loader.busy_with().next(),
                 document,
                 interface: &self.interface,
                 is_repeatable: self.is_repeatable,
@@ -271,7 +271,7 @@ impl App {
             interface: &mut self.interface,
             display: &mut self.display,
             rendering: &self.rendering,
-            loading: self.assets.loading().next().is_some(),
+            loading: self.assets.loader.busy_with().next().is_some(),
             commands,
         };
         panels::viewport::show(ui, &mut scope)

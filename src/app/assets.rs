@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::document::{Document, Viewpoint};
-use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader, Loading};
+use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
 use super::reload::Reload;
 use super::worker::Reference;
 use crate::environment::Environment;
@@ -67,13 +67,8 @@ impl Assets {
     /// Whether scene and map are there as the document wants them.
     pub(super) fn are_as_in(&self, document: &Document) -> bool {
         let document = &*document.unmixed();
-        self.scene_of(document).is_some_and(|scene| scene.is_edited_as(document))
+        self.scene_of(document).is_some_and(|scene| document.has_changes(&scene.changes))
             && self.map_of(document).is_some_and(|map| map.sun_factor == document.sun)
-    }
-
-    /// What is being loaded.
-    pub(super) fn loading(&self) -> impl Iterator<Item = Loading<'_>> {
-        self.loader.busy_with()
     }
 
     /// What has been loaded since this was asked last and is still wanted.
@@ -88,7 +83,7 @@ impl Assets {
         let document = &*document.unmixed();
         match self.scene.as_ref().filter(|scene| scene.name == document.scene) {
             None => self.loader.load_scene(&document.scene),
-            Some(scene) if !scene.is_edited_as(document) => {
+            Some(scene) if !document.has_changes(&scene.changes) => {
                 self.loader.edit_scene(scene, document);
             }
             Some(_) => {}
@@ -112,7 +107,7 @@ impl Assets {
     /// What another program has written anew, once what was read before is there; nothing unless it is `wanted`.
     pub(super) fn changed(&self, document: &Document, wanted: bool) -> Vec<Kind> {
         let Some(reload) = self.reload.as_ref().filter(|_| wanted) else { return Vec::new() };
-        let is_there = |name: &str| self.loading().all(|busy| busy.name != name);
+        let is_there = |name: &str| self.loader.busy_with().all(|busy| busy.name != name);
         let kinds = [(Kind::Scene, &document.scene), (Kind::Map, &document.map)];
         let changed = |(kind, name): &(Kind, &String)| is_there(name) && reload.takes(*kind);
         kinds.into_iter().filter(changed).map(|(kind, _)| kind).collect()

@@ -58,10 +58,7 @@ impl Convergence {
 
 /// What a person calls a way of sampling.
 pub(crate) fn name_of(sampling: Sampling) -> String {
-    match sampling {
-        Sampling::Bsdf => "BSDF".to_owned(),
-        other => other.to_string(),
-    }
+    if sampling == Sampling::Bsdf { "BSDF".to_owned() } else { sampling.to_string() }
 }
 
 #[cfg(test)]

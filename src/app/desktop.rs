@@ -85,10 +85,8 @@ impl Desktop {
             dialogue = dialogue.set_parent(&**window);
         }
         // What was opened last lies beside what is opened next.
-        let recent = match purpose {
-            Purpose::Map => &settings.recent_maps,
-            _ => &settings.recent_scenes,
-        };
+        let Settings { recent_maps, recent_scenes, .. } = settings;
+        let recent = if purpose == Purpose::Map { recent_maps } else { recent_scenes };
         let beside = recent.first().and_then(|name| Path::new(name).parent());
         let path = beside.filter(|_| path.is_empty()).unwrap_or(Path::new(path));
         let Ok(path) = std::path::absolute(path) else { return dialogue };

@@ -48,18 +48,12 @@ pub(super) enum Step {
 impl Step {
     /// Points it went to the right.
     pub(super) fn right(&self) -> f32 {
-        match self {
-            Self::Move { by, .. } => by.x,
-            Self::End { .. } => 0.0,
-        }
+        if let Self::Move { by, .. } = self { by.x } else { 0.0 }
     }
 
     /// Where the button was let go, if it was.
     pub(super) fn end(&self) -> Option<Pos2> {
-        match self {
-            Self::Move { .. } => None,
-            Self::End { to, .. } => Some(*to),
-        }
+        if let Self::End { to, .. } = self { Some(*to) } else { None }
     }
 }
 

@@ -336,7 +336,7 @@ impl App {
     /// Writes the picture, or remembers to when there is none as yet or only a small one.
     pub(super) fn save(&mut self, path: PathBuf) {
         self.library.note_save(&path);
-        self.saves.add(path);
+        self.saves.waiting.push(path);
         if self.picture().is_none() {
             let paused = match self.interface.paused {
                 true => "; rendering is paused, press Space to resume",

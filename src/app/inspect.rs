@@ -61,7 +61,8 @@ pub(super) struct Truth {
 /// Follows the pointer.
 #[derive(Default)]
 pub(super) struct Inspector {
-    inspected: Option<Inspected>,
+    /// What is inspected.
+    pub(super) inspected: Option<Inspected>,
     truth: Option<Truth>,
     /// The map that is inspected.
     environment: Option<Arc<Environment>>,
@@ -72,11 +73,6 @@ pub(super) struct Inspector {
 }
 
 impl Inspector {
-    /// What is inspected.
-    pub(super) fn inspected(&self) -> Option<&Inspected> {
-        self.inspected.as_ref()
-    }
-
     /// The truth at the inspected point, if it was measured.
     pub(super) fn truth(&self) -> Option<&Truth> {
         let here = self.inspected.as_ref()?.spot.position;

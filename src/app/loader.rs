@@ -50,11 +50,6 @@ impl LoadedScene {
         new
     }
 
-    /// Whether its materials and lights are as the document wants them.
-    pub(super) fn is_edited_as(&self, document: &Document) -> bool {
-        document.has_changes(&self.changes)
-    }
-
     /// The same with these changes in place of those that there are.
     fn edited(self, changes: SceneChanges) -> Result<Self> {
         let mut materials = self.materials.to_vec();

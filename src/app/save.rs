@@ -31,20 +31,11 @@ pub(super) struct Picture {
 /// Where the picture is to be written once it has its full size.
 #[derive(Default)]
 pub(super) struct Saves {
-    waiting: Vec<PathBuf>,
+    /// Paths that wait for it.
+    pub(super) waiting: Vec<PathBuf>,
 }
 
 impl Saves {
-    /// Has the picture written to a path.
-    pub(super) fn add(&mut self, path: PathBuf) {
-        self.waiting.push(path);
-    }
-
-    /// Whether no path waits.
-    pub(super) fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
-    }
-
     /// Writes a picture to all paths that wait.
     pub(super) fn write(&mut self, picture: Picture, tasks: &mut Tasks) {
         let picture = Arc::new(picture);

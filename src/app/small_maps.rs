@@ -40,7 +40,7 @@ pub(super) struct SmallMapsFound {
 #[derive(Default)]
 pub(super) struct SmallMaps {
     folder: Option<PathBuf>,
-    textures: BTreeMap<String, TextureHandle>,
+    pub(super) textures: BTreeMap<String, TextureHandle>,
     /// Maps in the folder of the one that was opened last.
     listed: Vec<String>,
     /// Maps of which a picture was tried to be made.
@@ -67,11 +67,6 @@ impl SmallMaps {
             let known = read_known(folder.as_deref(), &recent);
             SmallMapsFound { maps: known.chain(skies).collect(), ..SmallMapsFound::default() }
         }
-    }
-
-    /// The picture of a map, if there is one.
-    pub(super) fn of(&self, name: &str) -> Option<&TextureHandle> {
-        self.textures.get(name)
     }
 
     /// All maps in the folder of a map of this lasting name, if it was opened last.

@@ -50,7 +50,7 @@ impl App {
                 Loaded::Map(Err(error)) => self.refuse_map(&error),
             }
         }
-        while let Some(result) = self.tasks.next_result() {
+        while let Ok(result) = self.tasks.receiver.try_recv() {
             self.take_result(result, context);
         }
         for kind in self.assets.changed(&self.edited.document, self.library.settings.reloads) {
@@ -257,7 +257,7 @@ impl App {
             self.inspect();
             self.rendering.worker.submit(request);
         }
-        if !self.saves.is_empty()
+        if !self.saves.waiting.is_empty()
             && let Some(picture) = self.picture()
         {
             self.saves.write(picture, &mut self.tasks);

@@ -32,7 +32,8 @@ pub(super) enum TaskResult {
 /// Threads for one task each, and their results.
 pub(super) struct Tasks {
     sender: Sender<TaskResult>,
-    receiver: Receiver<TaskResult>,
+    /// Results that have come.
+    pub(super) receiver: Receiver<TaskResult>,
     wake: Wake,
     /// Threads that write files.
     writing: Vec<JoinHandle<()>>,
@@ -76,11 +77,6 @@ impl Tasks {
         self.writing.retain(|thread| !thread.is_finished());
         let thread = self.run(name, work);
         self.writing.extend(thread);
-    }
-
-    /// The next result, if one has come.
-    pub(super) fn next_result(&self) -> Option<TaskResult> {
-        self.receiver.try_recv().ok()
     }
 
     /// Waits until all files are written; the failures that have not been reported yet.

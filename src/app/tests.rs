@@ -163,12 +163,13 @@ fn what_is_being_loaded_can_be_given_up() {
     studio.asks(Command::OpenScene("exterior".into()));
     studio.asks(Command::OpenMap("sky:night".into()));
     studio.frame().expect("drawn");
-    let loading: Vec<&str> = studio.app.assets.loading().map(|loading| loading.name).collect();
+    let loading: Vec<&str> =
+        studio.app.assets.loader.busy_with().map(|loading| loading.name).collect();
     assert_eq!(loading, ["exterior", "sky:night"]);
     studio.asks(Command::StopLoading);
     assert_eq!(studio.app.edited.document, before, "all is as it was");
     studio.frame().expect("drawn");
-    assert!(studio.app.assets.loading().next().is_none());
+    assert!(studio.app.assets.loader.busy_with().next().is_none());
     assert!(studio.app.assets.are_named_by(&before), "what was shown is still there");
 }
 
@@ -218,7 +219,7 @@ fn a_paused_picture_goes_on_with_a_map_that_is_read_again() {
         write_picture(&file, &Image::filled(4, 2, [light; 3]));
         studio.asks(asked);
         // The picture of before may be done meanwhile.
-        while studio.app.assets.loading().next().is_some() {
+        while studio.app.assets.loader.busy_with().next().is_some() {
             studio.frame().expect("drawn");
         }
         studio.settle().expect("rendered");
@@ -526,7 +527,7 @@ fn the_truth_of_another_map_is_never_shown() {
     studio.asks(Command::OpenMap("sky:overcast@64x32".to_owned()));
     studio.settle().expect("rendered");
     studio.frame().expect("drawn");
-    assert!(studio.app.rendering.inspector.inspected().is_some());
+    assert!(studio.app.rendering.inspector.inspected.is_some());
     assert!(studio.app.rendering.inspector.truth().is_none(), "it is the old map's");
     assert_ne!(measured(&mut studio), day);
 }
@@ -554,7 +555,9 @@ fn maps_of_a_folder_are_listed_with_pictures() {
         panic!("it never comes");
     };
     until(&mut studio, &|studio| studio.app.library.small_maps.beside(&expected[1]) == expected);
-    let has = |studio: &Studio, i: usize| studio.app.library.small_maps.of(&expected[i]).is_some();
+    let has = |studio: &Studio, i: usize| {
+        studio.app.library.small_maps.textures.contains_key(&expected[i])
+    };
     assert!(!has(&studio, 0) && has(&studio, 1), "that of the open one alone");
     studio.asks(Command::MakeSmallMap);
     until(&mut studio, &|studio| has(studio, 0));

@@ -6,10 +6,12 @@ const MAX_STEPS: usize = 200;
 /// What was, what is, and what was taken back.
 #[derive(Debug, Clone)]
 pub(super) struct Undo<T> {
-    past: Vec<T>,
+    /// What can be gone back to, oldest first.
+    pub(super) past: Vec<T>,
     /// The state at rest.
     pub(super) present: T,
-    future: Vec<T>,
+    /// What was taken back, the last at the end.
+    pub(super) future: Vec<T>,
 }
 
 impl<T: Clone + PartialEq> Undo<T> {
@@ -67,16 +69,6 @@ impl<T: Clone + PartialEq> Undo<T> {
         self.past.push(std::mem::replace(&mut self.present, after.clone()));
         Some(after)
     }
-
-    /// Whether there is something to go back to.
-    pub(super) fn can_undo(&self) -> bool {
-        !self.past.is_empty()
-    }
-
-    /// Whether there is something that was taken back.
-    pub(super) fn can_redo(&self) -> bool {
-        !self.future.is_empty()
-    }
 }
 
 #[cfg(test)]
@@ -87,13 +79,13 @@ mod tests {
     fn steps_go_back_and_forth_and_a_new_one_forgets_the_future() {
         let mut undo = Undo::new(1);
         undo.settle(&1);
-        assert!(!undo.can_undo());
+        assert!(undo.past.is_empty());
         undo.settle(&2);
         undo.settle(&3);
         assert_eq!((undo.undo(), undo.undo(), undo.undo()), (Some(2), Some(1), None));
         assert_eq!(undo.redo(), Some(2));
         undo.settle(&9);
-        assert!(!undo.can_redo());
+        assert!(undo.future.is_empty());
         assert_eq!(undo.undo(), Some(2));
     }
 
@@ -108,7 +100,7 @@ mod tests {
         // What was is no longer to be had.
         assert_eq!(undo.undo(), Some(1));
         undo.correct(&1, &2);
-        assert!(!undo.can_undo() && !undo.can_redo());
+        assert!(undo.past.is_empty() && undo.future.is_empty());
         // It is none of what is at rest.
         undo.correct(&7, &8);
         assert_eq!(undo.present, 2);

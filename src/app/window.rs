@@ -367,10 +367,8 @@ impl Running {
             );
         };
         // egui's renderer panics if the device is lost while it draws.
-        let drawn = catch_unwind(AssertUnwindSafe(|| match is_stale {
-            true => gpu.alone(paint),
-            false => paint(),
-        }));
+        let drawn =
+            catch_unwind(AssertUnwindSafe(|| if is_stale { gpu.alone(paint) } else { paint() }));
         output.textures_delta.clear();
         if self.canvas.is_stale.load(Ordering::Relaxed) {
             self.canvas.context.request_repaint();

@@ -62,7 +62,7 @@ pub(in crate::app) fn show(
         picture(ui, snapshot);
     }
     theme::section(ui, "CELL UNDER THE POINTER");
-    match inspector.inspected() {
+    match &inspector.inspected {
         Some(inspected) => {
             measure(ui, interface, inspector, commands);
             if let Some(truth) = inspector.truth() {

@@ -212,12 +212,12 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
         theme::note(ui, "Built in");
         for name in sky::names() {
             let name = format!("sky:{name}");
-            let small = sources.small_maps.of(&name);
+            let small = sources.small_maps.textures.get(&name);
             if named(ui, document.map == name, small, &name).clicked() {
                 chosen = Some(name);
             }
         }
-        let small = |name: &str| sources.small_maps.of(name);
+        let small = |name: &str| sources.small_maps.textures.get(name);
         let current = lasting_map(&document.map);
         let beside = sources.small_maps.beside(&current);
         let is_recent = |name: &String| !beside.contains(name);

@@ -109,8 +109,9 @@ fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
             commands.push(command);
         }
     };
-    button(undo.can_undo(), "Undo", "Undo the last change of a setting (Ctrl Z)", Command::Undo);
-    button(undo.can_redo(), "Redo", "Redo (Ctrl Y)", Command::Redo);
+    let hint = "Undo the last change of a setting (Ctrl Z)";
+    button(!undo.past.is_empty(), "Undo", hint, Command::Undo);
+    button(!undo.future.is_empty(), "Redo", "Redo (Ctrl Y)", Command::Redo);
 }
 
 /// Who renders; what is highlighted is what does, not what was asked for.

@@ -22,7 +22,8 @@ pub(super) struct Device {
     uploaded: Option<Uploaded>,
     /// The kernels that a session waits for on the CPU.
     awaited: Option<Awaited>,
-    failure: Option<String>,
+    /// What went wrong since somebody took note of it.
+    pub(super) failure: Option<String>,
     /// The geometry that the GPU failed with.
     refused: Option<Weak<()>>,
 }
@@ -161,11 +162,6 @@ impl Device {
         self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
     }
 
-    /// What went wrong since this was asked last.
-    pub(super) fn take_failure(&mut self) -> Option<String> {
-        self.failure.take()
-    }
-
     fn choose(&mut self, choice: DeviceChoice) {
         self.choice = Some(choice);
         (self.gpu, self.uploaded, self.awaited, self.refused) = (None, None, None, None);
@@ -211,7 +207,7 @@ mod tests {
         device.choose_for(&first);
         assert!(device.gpu.is_some());
         device.give_up(&Error::new("it takes too much"), &first);
-        assert_eq!(device.take_failure().as_deref(), Some("it takes too much; the CPU renders"));
+        assert_eq!(device.failure.take().as_deref(), Some("it takes too much; the CPU renders"));
         let materials = first.world.scene.materials.clone();
         let edited = first
             .world

@@ -31,7 +31,7 @@ pub(super) struct Preview {
     /// The main film that was shown last, the number of cached samples beside it, and the errors of both.
     errors: Option<(Weak<Film>, u64, Option<BlockErrors>)>,
     /// The main and the plain picture, as they were copied last.
-    copies: [Option<FilmCopy>; 2],
+    pub(super) copies: [Option<FilmCopy>; 2],
     /// The cached picture, as it was copied last, of so many samples.
     cached_copy: Option<(u64, Arc<Film>)>,
     /// Copies that somebody still has.
@@ -41,7 +41,7 @@ pub(super) struct Preview {
 }
 
 /// A session's picture as it was when its film was copied or, where it is shown in place, read back.
-struct FilmCopy {
+pub(super) struct FilmCopy {
     session: SessionSnapshot,
     /// Where the film is shown in place meanwhile.
     of: Option<(Gpu, DeviceFilm)>,
@@ -51,11 +51,6 @@ struct FilmCopy {
 }
 
 impl Preview {
-    /// Lets go of the copy of the plain picture.
-    pub(super) fn end_plain(&mut self) {
-        self.copies[PLAIN] = None;
-    }
-
     /// Decides before a picture is published whether new copies are wanted, which are not where `is_throttled`. A
     /// picture that `is_final` is always copied.
     pub(super) fn prepare(&mut self, is_final: bool, is_throttled: bool) {

@@ -31,7 +31,7 @@ pub(super) struct SessionCache {
     /// A map as a mix has parted it last, and what it was made from.
     parts: Option<(Environment, [Environment; 2])>,
     /// Pictures that were left for others, oldest first.
-    left: Vec<SuspendedPicture>,
+    pub(super) left: Vec<SuspendedPicture>,
 }
 
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
@@ -89,11 +89,6 @@ pub(super) struct Learned {
 }
 
 impl SessionCache {
-    /// Keeps a picture that is left for another.
-    pub(super) fn leave(&mut self, left: SuspendedPicture) {
-        self.left.push(left);
-    }
-
     /// The picture that was left of the very same.
     pub(super) fn come_back(&mut self, request: &Request) -> Option<SuspendedPicture> {
         let found = self.left.iter().position(|left| left.request.is_resumed_by(request))?;

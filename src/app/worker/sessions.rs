@@ -1,5 +1,6 @@
 //! Sessions for a request: with what is known, on which device, and how far they go at a time.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -120,9 +121,19 @@ impl<'a> Sessions<'a> {
         self.kept.keep_training(session, &self.watch.request);
     }
 
-    /// Waits until something else is asked for, or kernels are compiled; whether that is it.
+    /// Waits until something else is asked for, or kernels are compiled that were not; whether they are.
     pub(super) fn rest(&self) -> bool {
-        self.watch.rest(self.device)
+        let Self { watch, device, .. } = self;
+        watch.shared.orders.wait(|slot| {
+            let is_other = slot.value.as_ref().is_none_or(|new| !watch.request.is_same(new));
+            if slot.is_closed || is_other {
+                ControlFlow::Break(false)
+            } else if device.was_compiling() && !device.is_compiling() {
+                ControlFlow::Break(true)
+            } else {
+                ControlFlow::Continue(None)
+            }
+        })
     }
 
     /// One pass on the device that is asked for, cut short after a slice if asked for.
@@ -216,7 +227,7 @@ impl<'a> Sessions<'a> {
     }
 
     fn report_failure(&mut self) {
-        if let Some(sentence) = self.device.take_failure() {
+        if let Some(sentence) = self.device.failure.take() {
             self.watch.shared.report_failure(sentence);
         }
     }

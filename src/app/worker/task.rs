@@ -220,7 +220,7 @@ impl<'a> PictureTask<'a> {
         }
         if !request.split {
             *plain = None;
-            self.preview.end_plain();
+            self.preview.copies[PLAIN] = None;
             self.inspection.curves[PLAIN].clear();
         } else if plain.is_none() {
             let view = View { sampling: Sampling::Plain, ..request.view.clone() };
@@ -270,7 +270,7 @@ impl<'a> PictureTask<'a> {
             cached_seconds: self.cached_seconds,
         };
         if left.is_worth_it() {
-            self.sessions.kept.leave(left);
+            self.sessions.kept.left.push(left);
         }
     }
 

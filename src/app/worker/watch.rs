@@ -1,10 +1,8 @@
 //! The request that is worked on, and what was asked for since.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::device::Device;
 use super::request::Request;
 use super::shared::Shared;
 
@@ -57,19 +55,5 @@ impl RequestWatch<'_> {
             Arc::ptr_eq(&next.world, &self.request.world) && self.request.is_lit_like(next)
         };
         self.shared.orders.slot().value.as_ref().is_some_and(is_lit_alike)
-    }
-
-    /// Waits until something else is asked for, or kernels are compiled that were not; whether they are.
-    pub(super) fn rest(&self, device: &Device) -> bool {
-        self.shared.orders.wait(|slot| {
-            let is_other = slot.value.as_ref().is_none_or(|new| !self.request.is_same(new));
-            if slot.is_closed || is_other {
-                ControlFlow::Break(false)
-            } else if device.was_compiling() && !device.is_compiling() {
-                ControlFlow::Break(true)
-            } else {
-                ControlFlow::Continue(None)
-            }
-        })
     }
 }
