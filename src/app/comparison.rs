@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use super::history::History;
 use super::interface::Chosen;
 use super::kept_picture::Pixels;
-use crate::develop::{Developer, LinearPicture};
+use crate::develop::LinearPicture;
 use crate::image::Image;
 use crate::metrics::relative_rms_error;
+use crate::render::gpu::Gpu;
 
 /// Differences are shown so many times as bright as they are.
 pub(super) const AMPLIFIED: f32 = 4.0;
@@ -72,11 +73,7 @@ impl Comparison {
     }
 
     /// Makes it ready; `now` is the picture that is rendered.
-    pub(super) fn prepare(
-        &self,
-        developer: &Developer,
-        now: impl FnOnce() -> Arc<Image>,
-    ) -> Compared {
+    pub(super) fn prepare(&self, gpu: &Gpu, now: impl FnOnce() -> Arc<Image>) -> Compared {
         let mut compared = Compared::default();
         let right = self.right.as_ref().map(|pixels| pixels.get()).transpose();
         let (left, right) = match (self.left.get(), right) {
@@ -96,14 +93,14 @@ impl Comparison {
             };
             match found {
                 Ok((image, difference)) => {
-                    let picture = Some(LinearPicture::of_image(&developer.gpu, &image));
+                    let picture = Some(LinearPicture::of_image(gpu, &image));
                     return Compared { picture, difference, ..compared };
                 }
                 Err(sentence) => compared.failure = Some(sentence),
             }
         }
-        compared.picture = right.map(|image| LinearPicture::of_image(&developer.gpu, &image));
-        compared.other = Some(LinearPicture::of_image(&developer.gpu, &left));
+        compared.picture = right.map(|image| LinearPicture::of_image(gpu, &image));
+        compared.other = Some(LinearPicture::of_image(gpu, &left));
         compared
     }
 }

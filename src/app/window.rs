@@ -504,14 +504,11 @@ impl ApplicationHandler<Call> for Runner {
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let Some(running) = &self.running else { return };
-        match self.repaint_at {
-            Some(at) if at <= Instant::now() + Duration::from_millis(1) => {
-                self.repaint_at = None;
-                running.canvas.window.request_redraw();
-                event_loop.set_control_flow(ControlFlow::Wait);
-            }
-            Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),
-            None => event_loop.set_control_flow(ControlFlow::Wait),
+        let soon = Instant::now() + Duration::from_millis(1);
+        if self.repaint_at.take_if(|at| *at <= soon).is_some() {
+            running.canvas.window.request_redraw();
         }
+        let flow = self.repaint_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil);
+        event_loop.set_control_flow(flow);
     }
 }

@@ -198,7 +198,7 @@ impl Memory {
             let now = || own.unwrap_or_else(|| Arc::new(source.session.film.image()));
             let shows_now = comparison.is_difference && comparison.right.is_none();
             let of = shows_now.then(|| source.key());
-            let compare = || Ok(comparison.prepare(&developer, now));
+            let compare = || Ok(comparison.prepare(&developer.gpu, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
             shown.picture = compared.picture.unwrap_or(shown.picture);
             (shown.other, shown.difference) = (compared.other, compared.difference);
@@ -301,30 +301,25 @@ impl Memory {
     /// Brings surfaces and facts up to date with the snapshot.
     fn prepare(&mut self, snapshot: &Arc<Snapshot>) {
         let film = &snapshot.main.film;
-        let is_current = self.surfaces.as_ref().is_some_and(|(old, surfaces)| {
-            Arc::ptr_eq(&old.world, &snapshot.request.world)
-                && old.view.camera == snapshot.request.view.camera
-                && old.view.crop == snapshot.request.view.crop
-                && (surfaces.width, surfaces.height) == (film.width, film.height)
+        let request = &snapshot.request;
+        self.surfaces.take_if(|(old, surfaces)| {
+            !Arc::ptr_eq(&old.world, &request.world)
+                || (&old.view.camera, old.view.crop) != (&request.view.camera, request.view.crop)
+                || (surfaces.width, surfaces.height) != (film.width, film.height)
         });
-        if !is_current {
-            let view = snapshot.request.view.of_size(film.width, film.height);
-            let surfaces = SurfaceMap::of(&snapshot.request.world, &view);
-            self.surfaces = Some((Arc::clone(&snapshot.request), surfaces));
-        }
+        self.surfaces.get_or_insert_with(|| {
+            let view = request.view.of_size(film.width, film.height);
+            (Arc::clone(request), SurfaceMap::of(&request.world, &view))
+        });
         let Some(grid) = &snapshot.main.grid else {
             self.facts = None;
             return;
         };
         let counted = snapshot.counters.is_some();
-        let is_current = self
-            .facts
-            .as_ref()
-            .is_some_and(|(old, with, _)| Arc::ptr_eq(old, grid) && *with == counted);
-        if !is_current {
-            let environment = &snapshot.request.environment;
-            let facts = CellFacts::of(grid, snapshot.counters.as_deref(), environment);
-            self.facts = Some((Arc::clone(grid), counted, Arc::new(facts)));
-        }
+        self.facts.take_if(|(old, with, _)| !Arc::ptr_eq(old, grid) || *with != counted);
+        self.facts.get_or_insert_with(|| {
+            let facts = CellFacts::of(grid, snapshot.counters.as_deref(), &request.environment);
+            (Arc::clone(grid), counted, Arc::new(facts))
+        });
     }
 }

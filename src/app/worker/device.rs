@@ -19,7 +19,8 @@ pub(super) struct Device {
     screen: Arc<Mutex<Gpu>>,
     choice: Option<DeviceChoice>,
     gpu: Option<Gpu>,
-    uploaded: Option<Uploaded>,
+    /// What is on the GPU.
+    uploaded: Option<(Arc<World>, UploadedScene)>,
     /// The kernels that a session waits for on the CPU.
     awaited: Option<Awaited>,
     /// What went wrong since somebody took note of it.
@@ -36,12 +37,6 @@ struct Awaited {
     view: View,
     /// What is held until then.
     held: Weak<CompileGuard>,
-}
-
-/// What is on the GPU.
-struct Uploaded {
-    world: Arc<World>,
-    scene: UploadedScene,
 }
 
 impl Device {
@@ -79,7 +74,7 @@ impl Device {
     /// Whether a GPU was chosen to which the scene has to be uploaded.
     pub(super) fn needs_upload(&self, request: &Request) -> bool {
         let is_uploaded =
-            self.uploaded.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
+            self.uploaded.as_ref().is_some_and(|(on, _)| Arc::ptr_eq(on, &request.world));
         self.gpu.is_some() && !is_uploaded
     }
 
@@ -183,12 +178,12 @@ impl Device {
         environment: &Environment,
     ) -> Result<&UploadedScene> {
         let world = Arc::clone(&request.world);
-        let before = self.uploaded.take().filter(|on| Arc::ptr_eq(&on.world, &world));
+        let before = self.uploaded.take().filter(|(on, _)| Arc::ptr_eq(on, &world));
         let scene = match before {
-            Some(on) => on.scene.relit(environment)?,
+            Some((_, scene)) => scene.relit(environment)?,
             None => UploadedScene::new(gpu, &world, environment)?,
         };
-        Ok(&self.uploaded.insert(Uploaded { world, scene }).scene)
+        Ok(&self.uploaded.insert((world, scene)).1)
     }
 }
 

@@ -29,14 +29,9 @@ impl Inspection {
     pub(super) fn distributions_of(&mut self, session: &Session<'_>) -> Option<Arc<LightGrid>> {
         let grid = session.grid()?;
         let key = (std::ptr::from_ref(grid).addr(), session.figures().distribution_paths);
-        Some(match &self.distributions {
-            Some((old, distributions)) if *old == key => Arc::clone(distributions),
-            _ => {
-                let distributions = Arc::new(grid.clone());
-                self.distributions = Some((key, Arc::clone(&distributions)));
-                distributions
-            }
-        })
+        self.distributions.take_if(|(old, _)| *old != key);
+        let copy = || (key, Arc::new(grid.clone()));
+        Some(Arc::clone(&self.distributions.get_or_insert_with(copy).1))
     }
 
     /// What is in the radiance cache that `session` trains or, if it trains none, that was trained before. None is used

@@ -123,16 +123,12 @@ impl SessionCache {
         }
     }
 
-    /// A map of factors 1 as these make it.
+    /// A map of factors 1 as those of a mix make it.
     ///
     /// # Errors
     /// If there is no memory for it.
-    pub(super) fn lit_by(
-        &mut self,
-        map: &Environment,
-        factors: &LightFactors,
-    ) -> Result<Environment> {
-        let sun = factors.sun;
+    pub(super) fn lit_by(&mut self, map: &Environment, mix: &LightFactors) -> Result<Environment> {
+        let sun = mix.sun;
         self.lit.take_if(|(of, factor, _)| !of.shares_map_with(map) || *factor != sun);
         let (_, _, lit) = match self.lit.take() {
             Some(lit) => self.lit.insert(lit),
@@ -140,7 +136,7 @@ impl SessionCache {
             None => self.lit.insert((map.clone(), sun, map.with_sun(sun)?)),
         };
         let mut lit = turned(lit, map);
-        lit.set_intensity(factors.intensity);
+        lit.set_intensity(mix.intensity);
         Ok(lit)
     }
 
