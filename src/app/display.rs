@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::comparison::Comparison;
 use super::document::Document;
-use super::interface::Interface;
 use super::overlays::Overlay;
 use super::presenter::{Order, Presenter, Shown};
 use super::screen::{Developed, Screen};
@@ -113,14 +112,9 @@ impl Display {
         Some(document.look.total_ev(self.shown.as_ref()?.automatic_ev))
     }
 
-    /// How the picture is developed, once the exposure is known.
-    pub(super) fn settings(
-        &self,
-        document: &Document,
-        interface: &Interface,
-    ) -> Option<DevelopSettings> {
+    /// How the picture is developed under overlays of this opacity, once the exposure is known.
+    pub(super) fn settings(&self, document: &Document, opacity: f32) -> Option<DevelopSettings> {
         let look = &document.look;
-        let opacity = interface.overlay_opacity;
         let opacity = match self.shown.as_ref().and_then(|shown| shown.order.overlay) {
             Some(overlay) if overlay.is_opaque() => [1.0, 0.6],
             Some(Overlay::Sun) => [0.6 * opacity, 0.0],

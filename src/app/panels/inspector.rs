@@ -12,6 +12,7 @@ use crate::app::overlays::{length, palette};
 use crate::app::theme;
 use crate::app::worker::Snapshot;
 use crate::environment::sun::Sun;
+use crate::light_grid::counters::Tally;
 
 /// Axes that surfaces face.
 const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
@@ -50,7 +51,7 @@ pub(in crate::app) fn show(
         theme::note(ui, sun_sentence(sun, turns));
     }
     if let Some(tile) = interface.tile {
-        chosen_tile(ui, interface, map.environment.tile_grid(), tile, &energies);
+        chosen_tile(ui, interface, map, tile, &energies);
     } else {
         theme::note(ui, "Click a tile to see which cells sample it.");
     }
@@ -64,7 +65,7 @@ pub(in crate::app) fn show(
     theme::section(ui, "CELL UNDER THE POINTER");
     match &inspector.inspected {
         Some(inspected) => {
-            measure(ui, interface, inspector, commands);
+            measure(ui, interface, inspector.busy, commands);
             if let Some(truth) = inspector.truth() {
                 let misplaced = inspected.cell.map(|_| misplaced(truth, inspected));
                 pixel_light::show(ui, truth, misplaced);
@@ -176,13 +177,8 @@ fn largest(shares: &[f32]) -> f32 {
     shares.iter().copied().fold(MIN_SHARE * 10.0, f32::max)
 }
 
-fn chosen_tile(
-    ui: &mut Ui,
-    interface: &mut Interface,
-    (columns, _): (u32, u32),
-    tile: u32,
-    shares: &[f32],
-) {
+fn chosen_tile(ui: &mut Ui, interface: &mut Interface, map: &LoadedMap, tile: u32, shares: &[f32]) {
+    let (columns, _) = map.environment.tile_grid();
     let share = shares.get(tile as usize).copied().unwrap_or(0.0);
     let place = format!("row {}, column {}", tile / columns, tile % columns);
     ui.label(format!("Tile {tile}, {place}: {} of the map", theme::percent(share)));
@@ -193,15 +189,10 @@ fn chosen_tile(
 }
 
 /// Asks for what is true under the pointer.
-fn measure(
-    ui: &mut Ui,
-    interface: &mut Interface,
-    inspector: &Inspector,
-    commands: &mut Vec<Command>,
-) {
+fn measure(ui: &mut Ui, interface: &mut Interface, is_busy: bool, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
-        let label = if inspector.busy { "Measuring…" } else { "Measure the truth" };
-        let button = ui.add_enabled(!inspector.busy, egui::Button::new(label));
+        let label = if is_busy { "Measuring…" } else { "Measure the truth" };
+        let button = ui.add_enabled(!is_busy, egui::Button::new(label));
         let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
         if button.on_hover_text(hint).clicked() {
             if interface.pinned.is_none() {
@@ -392,30 +383,20 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
     let truth = inspector.truth();
     let tiles = listed(&inspected.probabilities, truth.map(|truth| &truth.shares[..]));
     Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
-        for name in ["Tile", "Share", "Tries", "Ratio"] {
-            theme::note(ui, name);
-        }
-        if truth.is_some() {
-            theme::note(ui, "Truth");
-        }
+        let names = ["Tile", "Share", "Tries", "Ratio"].into_iter().chain(truth.map(|_| "Truth"));
+        names.for_each(|name| theme::note(ui, name));
         ui.end_row();
         for tile in tiles {
-            let p = inspected.probabilities[tile];
-            let mut number = |text: String| ui.label(RichText::new(text).size(12.5));
-            number(tile.to_string());
-            number(theme::percent(p));
-            match inspected.tallies.get(tile) {
-                Some(tally) if tally.tries > 0.0 => {
-                    number(theme::count(tally.tries as u64));
-                    number(format!("{:.3}", tally.weight / tally.tries));
+            let share = theme::percent(inspected.probabilities[tile]);
+            let (tries, ratio) = match inspected.tallies.get(tile) {
+                Some(Tally { tries, weight, .. }) if *tries > 0.0 => {
+                    (theme::count(*tries as u64), format!("{:.3}", weight / tries))
                 }
-                _ => {
-                    number("0".to_owned());
-                    number("pooled".to_owned());
-                }
-            }
-            if let Some(truth) = truth {
-                number(theme::percent(truth.shares[tile]));
+                _ => ("0".to_owned(), "pooled".to_owned()),
+            };
+            let truth = truth.map(|truth| theme::percent(truth.shares[tile]));
+            for number in [tile.to_string(), share, tries, ratio].into_iter().chain(truth) {
+                ui.label(RichText::new(number).size(12.5));
             }
             ui.end_row();
         }

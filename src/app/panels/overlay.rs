@@ -76,7 +76,8 @@ fn legend(ui: &mut Ui, legend: &Legend) {
             for (color, name) in names {
                 ui.horizontal(|ui| {
                     let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
-                    ui.painter().rect_filled(rect, 3.0, of(*color));
+                    let [r, g, b] = *color;
+                    ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(r, g, b));
                     ui.add(egui::Label::new(name).wrap());
                 });
             }
@@ -90,8 +91,4 @@ fn legend(ui: &mut Ui, legend: &Legend) {
         Legend::None => {}
         Legend::Empty => theme::note(ui, "No pixel has a value."),
     }
-}
-
-fn of([r, g, b]: [u8; 3]) -> Color32 {
-    Color32::from_rgb(r, g, b)
 }

@@ -29,7 +29,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let scale = ui.ctx().pixels_per_point();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
-        let settings = scope.display.settings(scope.document, scope.interface);
+        let settings = scope.display.settings(scope.document, scope.interface.overlay_opacity);
         let shown = scope.display.shown.clone();
         let Some((shown, settings)) = shown.as_deref().zip(settings) else {
             ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
