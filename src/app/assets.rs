@@ -12,17 +12,8 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::framing;
 use crate::render::surface_map;
-use crate::scene::{Camera, Material, StartView};
+use crate::scene::{Camera, StartView};
 use crate::sources;
-
-/// A map turned and scaled.
-struct TransformedMap {
-    /// What it was made from.
-    map: Arc<Environment>,
-    rotation_degrees: f32,
-    intensity: f32,
-    environment: Arc<Environment>,
-}
 
 /// What is loaded.
 pub(super) struct Assets {
@@ -34,8 +25,9 @@ pub(super) struct Assets {
     pub(super) scene: Option<LoadedScene>,
     /// The map in use.
     pub(super) map: Option<LoadedMap>,
-    /// It, turned and scaled as the document says.
-    transformed: Option<TransformedMap>,
+    /// It, turned and scaled as the document says: what it was made from, rotation in degrees and intensity, and what
+    /// that gave.
+    transformed: Option<(Arc<Environment>, [f32; 2], Arc<Environment>)>,
     /// What errors are measured against.
     pub(super) reference: Option<Arc<Reference>>,
     /// What was shown when it came.
@@ -130,21 +122,15 @@ impl Assets {
     pub(super) fn environment(&mut self, document: &Document) -> Option<Arc<Environment>> {
         let document = &*document.unmixed();
         let map = &self.map.as_ref()?.environment;
-        let (rotation_degrees, intensity) = (document.rotation_degrees, document.intensity);
-        let is_current = self.transformed.as_ref().is_some_and(|transformed| {
-            Arc::ptr_eq(&transformed.map, map)
-                && transformed.rotation_degrees == rotation_degrees
-                && transformed.intensity == intensity
-        });
-        if !is_current {
+        let asked = [document.rotation_degrees, document.intensity];
+        self.transformed.take_if(|(of, was, _)| !Arc::ptr_eq(of, map) || *was != asked);
+        let (_, _, transformed) = self.transformed.get_or_insert_with(|| {
             let mut environment = (**map).clone();
-            environment.set_rotation(rotation_degrees.to_radians());
-            environment.set_intensity(intensity);
-            let (map, environment) = (Arc::clone(map), Arc::new(environment));
-            self.transformed =
-                Some(TransformedMap { map, rotation_degrees, intensity, environment });
-        }
-        self.transformed.as_ref().map(|transformed| Arc::clone(&transformed.environment))
+            environment.set_rotation(document.rotation_degrees.to_radians());
+            environment.set_intensity(document.intensity);
+            (Arc::clone(map), asked, Arc::new(environment))
+        });
+        Some(Arc::clone(transformed))
     }
 
     /// Measures errors against a picture from now on, or against none.
@@ -153,14 +139,9 @@ impl Assets {
     }
 
     /// Keeps the reference with materials that were given other numbers.
-    pub(super) fn renumber_reference(
-        &mut self,
-        scene: &str,
-        before: &[Material],
-        now: &[Material],
-    ) {
-        if let Some(of) = self.reference_of.as_mut().filter(|of| of.scene == scene) {
-            of.renumber(before, now);
+    pub(super) fn renumber_reference(&mut self, before: &LoadedScene, now: &LoadedScene) {
+        if let Some(of) = self.reference_of.as_mut().filter(|of| of.scene == now.name) {
+            of.renumber(&before.materials, &now.materials);
         }
     }
 

@@ -47,19 +47,13 @@ impl Desktop {
     }
 
     /// Opens the system's file dialogue before a prompt, where there is one; its answer comes later.
-    pub(super) fn ask(
-        &mut self,
-        purpose: Purpose,
-        path: String,
-        settings: &Settings,
-        tasks: &Tasks,
-    ) {
+    pub(super) fn ask(&mut self, purpose: Purpose, path: &str, settings: &Settings, tasks: &Tasks) {
         // It belongs to another prompt.
         self.open = None;
         if self.has_none {
             return;
         }
-        let dialogue = self.dialogue(purpose, &path, settings);
+        let dialogue = self.dialogue(purpose, path, settings);
         let chosen: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> =
             match purpose.is_output() {
                 true => Box::pin(dialogue.save_file()),
@@ -73,6 +67,7 @@ impl Desktop {
             drop(window);
             Ok(TaskResult::Chosen(number, file.map(|file| file.path().display().to_string())))
         });
+        let path = path.to_owned();
         self.open = thread.map(|_| Dialogue { number, purpose, path, is_seen: false });
     }
 

@@ -55,10 +55,7 @@ impl App {
                 let mut read = |kind| self.assets.read_again(kind, document);
                 interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];
             }
-            Command::ToggleReloads => {
-                let reloads = &mut self.library.settings.reloads;
-                *reloads = !*reloads;
-            }
+            Command::ToggleReloads => self.library.settings.reloads ^= true,
             Command::Ask(purpose) => self.ask(purpose),
             Command::OpenReference(name) => {
                 self.tasks.run("reference", move || {
@@ -67,11 +64,7 @@ impl App {
                 });
             }
             Command::ForgetReference => self.assets.set_reference(None),
-            Command::ShowMethod => {
-                if let Err(sentence) = desktop::show_method() {
-                    self.messages.error(sentence);
-                }
-            }
+            Command::ShowMethod => self.messages.failure(desktop::show_method()),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
             Command::Copy => self.copy(context),
@@ -147,9 +140,7 @@ impl App {
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => self.set_as_kept(index),
             Command::RenameKept(index, name) => {
-                if let Err(error) = self.library.history.rename(index, &name) {
-                    self.messages.error(error.to_string());
-                }
+                self.messages.failure(self.library.history.rename(index, &name));
             }
             Command::ToggleZoom => interface.toggle_zoom(document.size),
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
@@ -190,10 +181,10 @@ impl App {
             Purpose::Distributions => "distributions.csv".to_owned(),
             _ => String::new(),
         };
-        self.interface.ask(purpose, path.clone());
         if !self.is_repeatable {
-            self.desktop.ask(purpose, path, &self.library.settings, &self.tasks);
+            self.desktop.ask(purpose, &path, &self.library.settings, &self.tasks);
         }
+        self.interface.ask(purpose, path);
     }
 
     /// Takes the settings that a kept picture was made with.
@@ -293,9 +284,7 @@ impl App {
         let exposure_ev = self.display.exposure_ev(document).unwrap_or_default();
         let small = display_rgb8(&small, exposure_ev, look.curve);
         let (index, failure) = self.library.history.keep(summary, &image, document.clone(), small);
-        if let Err(error) = failure {
-            self.messages.error(error.to_string());
-        }
+        self.messages.failure(failure);
         self.interface.compared = Chosen { left: Some(index), ..Chosen::default() };
         self.interface.tab = Tab::Picture;
     }

@@ -48,6 +48,11 @@ impl Messages {
         self.add(sentence.into(), true, None);
     }
 
+    /// That something failed, if it did.
+    pub(crate) fn failure(&mut self, outcome: Result<(), impl std::fmt::Display>) {
+        outcome.err().into_iter().for_each(|cause| self.error(cause.to_string()));
+    }
+
     /// Several things that failed.
     pub(crate) fn errors(&mut self, sentences: Vec<String>) {
         sentences.into_iter().for_each(|sentence| self.error(sentence));

@@ -30,7 +30,7 @@ impl App {
         for loaded in self.assets.take(&self.edited.document) {
             match loaded {
                 Loaded::Scene(Ok(scene)) => self.take_scene(scene),
-                Loaded::Scene(Err(error)) => self.refuse_scene(&error),
+                Loaded::Scene(Err(error)) => self.refuse(Kind::Scene, &error),
                 Loaded::Edited(Ok(scene)) => {
                     self.assets.scene = Some(scene);
                     self.rendering.inspector.forget();
@@ -47,7 +47,7 @@ impl App {
                     }
                 }
                 Loaded::Map(Ok(map)) => self.take_map(map),
-                Loaded::Map(Err(error)) => self.refuse_map(&error),
+                Loaded::Map(Err(error)) => self.refuse(Kind::Map, &error),
             }
         }
         while let Ok(result) = self.tasks.receiver.try_recv() {
@@ -101,19 +101,22 @@ impl App {
             let sentence = format!("{name}: {material}, which was changed, is no longer there");
             self.messages.notice(sentence);
         }
-        let (before, after) = (&before.materials, &now.materials);
-        self.assets.renumber_reference(&now.name, before, after);
-        let material = self.interface.material;
-        self.interface.material = material.and_then(|number| number_now(number, before, after));
+        self.assets.renumber_reference(before, now);
+        let number_now = |number| number_now(number, &before.materials, &now.materials);
+        self.interface.material = self.interface.material.and_then(number_now);
     }
 
     /// What is shown stays, and the document says so again.
-    fn refuse_scene(&mut self, error: &Error) {
-        match &self.assets.scene {
-            Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
-            None => self.messages.error(error.to_string()),
+    fn refuse(&mut self, kind: Kind, error: &Error) {
+        let (is_shown, why) = match kind {
+            Kind::Scene => (self.assets.scene.is_some(), "its scene cannot be read"),
+            Kind::Map => (self.assets.map.is_some(), "there is no picture"),
+        };
+        match is_shown {
+            true => self.messages.not_opened(kind, error.to_string()),
+            false => self.messages.error(error.to_string()),
         }
-        self.stay(Kind::Scene, "its scene cannot be read");
+        self.stay(kind, why);
     }
 
     /// Puts the scene or the map that is shown back into the document. Pictures of the other one that were to be saved
@@ -162,15 +165,6 @@ impl App {
         }
         self.assets.map = Some(map);
         self.rendering.inspector.forget();
-    }
-
-    /// What is shown stays, and the document says so again.
-    fn refuse_map(&mut self, error: &Error) {
-        match &self.assets.map {
-            Some(_) => self.messages.not_opened(Kind::Map, error.to_string()),
-            None => self.messages.error(error.to_string()),
-        }
-        self.stay(Kind::Map, "there is no picture");
     }
 
     fn take_result(&mut self, result: TaskResult, context: &egui::Context) {
@@ -277,9 +271,7 @@ impl App {
     }
 
     fn request(&mut self, now: f64) -> Option<Request> {
-        if let Err(sentence) = self.edited.check_size() {
-            self.messages.error(sentence);
-        }
+        self.messages.failure(self.edited.check_size());
         let (document, interface) = (&self.edited.document, &self.interface);
         let reference = self.assets.reference_for(document);
         // Another scene would be seen from this one's viewpoint.
