@@ -1,6 +1,5 @@
 //! A light mix: a picture of each group of light, shown as their sum.
 
-use std::cell::OnceCell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,7 +12,7 @@ use crate::render::block_errors::block_errors;
 use crate::render::cached_picture::{CachedPicture, suits, worth};
 use crate::render::film::Film;
 use crate::render::light_groups::{GroupImage, LightFactors, LightGroup, mixed};
-use crate::render::{Figures, Phase, Session, cut_off_notice};
+use crate::render::{Figures, Phase, Session};
 
 /// Works on the groups of one request until something else is asked for.
 pub(super) struct MixTask<'a> {
@@ -24,8 +23,6 @@ pub(super) struct MixTask<'a> {
     publish_gap: Duration,
     /// The exact samples of a sum, its noise, and the factors that it had.
     noise: (u32, f64, Option<LightFactors>),
-    /// A sentence where paths end with much of their light left.
-    cut_off: OnceCell<Option<Arc<str>>>,
 }
 
 /// The pictures by one group.
@@ -61,10 +58,9 @@ impl GroupPicture<'_> {
 
 impl<'a> MixTask<'a> {
     pub(super) fn new(sessions: Sessions<'a>) -> Self {
-        let inspection = Inspection::default();
-        let (publish_gap, cut_off) = (Duration::ZERO, OnceCell::new());
+        let (inspection, publish_gap) = (Inspection::default(), Duration::ZERO);
         let noise = (0, f64::INFINITY, None);
-        Self { sessions, inspection, published: None, publish_gap, noise, cut_off }
+        Self { sessions, inspection, published: None, publish_gap, noise }
     }
 
     /// Works until something else is asked for; the request that was worked on last.
@@ -221,14 +217,7 @@ impl<'a> MixTask<'a> {
             image: film.image(),
         };
         let groups = pictures.iter().zip(exact).map(image).collect();
-        let lit = (self.sessions.world, &*request.environment);
-        let cut_off = match main.samples {
-            0 => None,
-            _ => self
-                .cut_off
-                .get_or_init(|| cut_off_notice(lit, &request.view).map(Arc::from))
-                .clone(),
-        };
+        let cut_off = self.sessions.cut_off(main.samples);
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {

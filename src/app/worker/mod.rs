@@ -5,6 +5,7 @@
 //! pixel of every eighth row, then every fourth and second, so that there is a picture of the whole
 //! view at once and no sample is lost.
 
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -187,6 +188,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
                 device: &mut device,
                 kept: &mut kept,
                 alarm: &alarm,
+                cut_off: OnceCell::new(),
             };
             pool.install(|| match &groups {
                 Some(Ok(groups)) => MixTask::new(sessions).work(groups),

@@ -1,5 +1,6 @@
 //! Sessions for a request: with what is known, on which device, and how far they go at a time.
 
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,7 +15,7 @@ use crate::error::Result;
 use crate::light_grid::LearningGrid;
 use crate::path::World;
 use crate::render::gpu::CompileGuard;
-use crate::render::{Gi, Phase, Session, StopRule, View, next_beginning};
+use crate::render::{Gi, Phase, Session, StopRule, View, cut_off_notice, next_beginning};
 
 /// Longest piece of rendering between two looks at requests and clocks.
 pub(super) const SLICE: Duration = Duration::from_millis(120);
@@ -31,6 +32,8 @@ pub(super) struct Sessions<'a> {
     pub(super) device: &'a mut Device,
     pub(super) kept: &'a mut SessionCache,
     pub(super) alarm: &'a Alarm,
+    /// A sentence where paths end with much of their light left; asked for once there is a picture.
+    pub(super) cut_off: OnceCell<Option<Arc<str>>>,
 }
 
 impl<'a> Sessions<'a> {
@@ -230,6 +233,16 @@ impl<'a> Sessions<'a> {
         if let Some(sentence) = self.device.failure.take() {
             self.watch.shared.report_failure(sentence);
         }
+    }
+
+    /// What there is to say of a picture of so many samples where paths end with much of their light left.
+    pub(super) fn cut_off(&self, samples: u32) -> Option<Arc<str>> {
+        let request = &self.watch.request;
+        if request.moving || samples == 0 {
+            return None;
+        }
+        let notice = || cut_off_notice((&request.world, &request.environment), &request.view);
+        self.cut_off.get_or_init(|| notice().map(Arc::from)).clone()
     }
 
     /// Notes how fast the device is that a session is on.

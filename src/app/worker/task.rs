@@ -1,6 +1,5 @@
 //! One request being worked on.
 
-use std::cell::OnceCell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,7 +13,7 @@ use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
 use crate::render::cached_picture::{CachedPicture, suits, view};
 use crate::render::gpu::{DeviceFilm, Gpu};
-use crate::render::{Phase, Sampling, Session, StopRule, View, cut_off_notice};
+use crate::render::{Phase, Sampling, Session, StopRule, View};
 
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
@@ -28,8 +27,6 @@ pub(super) struct PictureTask<'a> {
     counters: Option<Arc<LearningGrid>>,
     /// Whether a cached picture would help.
     suits_cached: bool,
-    /// A sentence where paths end with much of their light left; asked for once there is a picture.
-    cut_off: OnceCell<Option<Arc<str>>>,
     /// Seconds spent on the cached picture.
     cached_seconds: f64,
     /// When what was published last, and when there may be something new.
@@ -85,7 +82,6 @@ impl<'a> PictureTask<'a> {
         let request = &sessions.watch.request;
         Self {
             suits_cached: !request.moving && suits(&request.world, &request.view),
-            cut_off: OnceCell::new(),
             sessions,
             preview: Preview::default(),
             inspection: Inspection::default(),
@@ -428,7 +424,7 @@ impl<'a> PictureTask<'a> {
         let (backdrop, errors) =
             self.preview.backdrop(&request, &main_snapshot.film, cached.as_ref());
         let is_quick = self.sessions.device.is_quick(&request);
-        let cut_off = self.cut_off(&request, main.samples());
+        let cut_off = self.sessions.cut_off(main.samples());
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {
@@ -458,14 +454,6 @@ impl<'a> PictureTask<'a> {
             let cost = (self.published - start).saturating_sub(reading);
             self.publish_gap = gap_after(cost);
         }
-    }
-
-    fn cut_off(&self, request: &Request, samples: u32) -> Option<Arc<str>> {
-        if request.moving || samples == 0 {
-            return None;
-        }
-        let notice = || cut_off_notice((&request.world, &request.environment), &request.view);
-        self.cut_off.get_or_init(|| notice().map(Arc::from)).clone()
     }
 
     fn session_snapshot(
