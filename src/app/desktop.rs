@@ -73,9 +73,8 @@ impl Desktop {
 
     /// A dialogue that begins where a path leads to.
     fn dialogue(&self, purpose: Purpose, path: &str, settings: &Settings) -> AsyncFileDialog {
-        let (kind, extensions) = purpose.files();
-        let mut dialogue =
-            AsyncFileDialog::new().set_title(purpose.title()).add_filter(kind, extensions);
+        let (title, kind, extensions) = purpose.words();
+        let mut dialogue = AsyncFileDialog::new().set_title(title).add_filter(kind, extensions);
         if let Some(window) = &self.window {
             dialogue = dialogue.set_parent(&**window);
         }
@@ -134,7 +133,7 @@ pub(super) fn show_method() -> Decoded<()> {
 impl Purpose {
     /// A path that was chosen with what its file's name ends in, where that is missing: not every dialogue adds it.
     fn completed(self, path: &str) -> Option<String> {
-        let (_, extensions) = self.files();
+        let (_, _, extensions) = self.words();
         let is_missing = self.is_output() && Path::new(path).extension().is_none();
         is_missing.then(|| format!("{path}.{}", extensions[0]))
     }

@@ -187,29 +187,18 @@ pub enum Purpose {
 }
 
 impl Purpose {
-    /// What its files hold, and their extensions.
-    pub fn files(self) -> (&'static str, &'static [&'static str]) {
+    /// What the question is called, what its files hold, and their extensions.
+    pub fn words(self) -> (&'static str, &'static str, &'static [&'static str]) {
+        const MAPS: &[&str] =
+            &["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "tga"];
         match self {
-            Self::Scene => ("glTF scene", &["gltf", "glb"]),
-            Self::Map => {
-                const KINDS: &[&str] =
-                    &["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "tga"];
-                ("Map", KINDS)
+            Self::Scene => ("Open a scene", "glTF scene", &["gltf", "glb"]),
+            Self::Map => ("Open a map", "Map", MAPS),
+            Self::Picture => ("Save the picture", "Picture", &["png", "exr"]),
+            Self::Distributions => {
+                ("Export the distributions", "Distributions", &["csv", "json", "exr"])
             }
-            Self::Picture => ("Picture", &["png", "exr"]),
-            Self::Distributions => ("Distributions", &["csv", "json", "exr"]),
-            Self::Reference => ("Picture", &["exr", "hdr"]),
-        }
-    }
-
-    /// What the question is called.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Scene => "Open a scene",
-            Self::Map => "Open a map",
-            Self::Picture => "Save the picture",
-            Self::Distributions => "Export the distributions",
-            Self::Reference => "Open a reference",
+            Self::Reference => ("Open a reference", "Picture", &["exr", "hdr"]),
         }
     }
 

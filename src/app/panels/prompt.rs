@@ -16,7 +16,7 @@ fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
     let refused = |sentence: &str| {
         Some(Refusal { path: typed.to_owned(), sentence: sentence.to_owned(), replaces: false })
     };
-    let (_, extensions) = purpose.files();
+    let (_, _, extensions) = purpose.words();
     let is_known = || extension(path).is_some_and(|extension| extensions.contains(&&*extension));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let is_built_in = match purpose {
@@ -68,7 +68,7 @@ pub(in crate::app) fn show(
     let (mut is_done, mut is_closed) = (false, false);
     let response = Modal::new(Id::unique("prompt")).show(context, |ui| {
         ui.set_width(520.0);
-        ui.label(RichText::new(prompt.purpose.title()).heading());
+        ui.label(RichText::new(prompt.purpose.words().0).heading());
         ui.add_space(4.0);
         let field = TextEdit::singleline(&mut prompt.path).hint_text(hint);
         let mut field = field.desired_width(f32::INFINITY).show(ui);
