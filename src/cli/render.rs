@@ -13,8 +13,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use glam::Vec2;
-
 use super::device::TakeOver;
 use super::interrupt::Interrupt;
 use super::progress::Progress;
@@ -75,15 +73,20 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
-    let turned;
-    let arguments = match arguments.sun_at {
-        None => arguments,
-        Some(place) => {
-            turned =
-                with_sun_at(place, arguments, (&world, &mut environment), &camera, &mut notices)?;
-            &turned
-        }
-    };
+    let mut arguments = Cow::Borrowed(arguments);
+    if let Some(place) = arguments.sun_at {
+        let view = View::new(camera.clone(), arguments.size.into());
+        let sun = Sun::of(environment.map());
+        let found = SunPlacement::find(&world, &view, sun.as_ref(), place, 0.0)
+            .map_err(|cause| Error::new(format!("--sun-at {},{}: {cause}", place.x, place.y)))?;
+        let degrees = found.rotation_degrees;
+        environment.set_rotation(degrees.to_radians());
+        notices
+            .add(format!("--sun-at turns the map by {degrees} degrees, as --env-rotation would"));
+        found.notice().into_iter().for_each(|sentence| notices.add(sentence));
+        arguments.to_mut().env_rotation = f64::from(degrees);
+    }
+    let arguments = &*arguments;
     arguments.check_fog(&world.scene, &mut notices);
     let cut_off = cut_off_notice((&world, &environment), &arguments.view(&world, camera.clone()));
     cut_off.into_iter().for_each(|sentence| notices.add(sentence));
@@ -358,25 +361,6 @@ fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
     let start = Instant::now();
     let world = World::new(scene);
     Ok((world, load_seconds, lap(start)))
-}
-
-/// The same arguments with the map turned so that its sun shines on a place of the picture; turns the map.
-fn with_sun_at(
-    place: Vec2,
-    arguments: &RenderArguments,
-    (world, environment): (&World, &mut Environment),
-    camera: &Camera,
-    notices: &mut Notices,
-) -> Result<RenderArguments> {
-    let view = View::new(camera.clone(), arguments.size.into());
-    let sun = Sun::of(environment.map());
-    let found = SunPlacement::find(world, &view, sun.as_ref(), place, 0.0)
-        .map_err(|cause| Error::new(format!("--sun-at {},{}: {cause}", place.x, place.y)))?;
-    let degrees = found.rotation_degrees;
-    environment.set_rotation(degrees.to_radians());
-    notices.add(format!("--sun-at turns the map by {degrees} degrees, as --env-rotation would"));
-    found.notice().into_iter().for_each(|sentence| notices.add(sentence));
-    Ok(RenderArguments { env_rotation: f64::from(degrees), ..arguments.clone() })
 }
 
 /// The map made ready to be sampled, what was repaired in it, and the seconds of loading and of

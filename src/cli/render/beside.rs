@@ -29,13 +29,8 @@ pub(super) struct Beside<'a> {
 
 impl<'a> Beside<'a> {
     /// For one picture of these arguments: not of a video, whose frames would differ by the cache's own error, nor where
-    /// there is no memory for another film of `film_bytes`.
-    pub(super) fn new(
-        arguments: &RenderArguments,
-        lit: Lit<'a>,
-        view: &View,
-        film_bytes: u64,
-    ) -> Self {
+    /// there is no memory for another film of so many `bytes`.
+    pub(super) fn new(arguments: &RenderArguments, lit: Lit<'a>, view: &View, bytes: u64) -> Self {
         let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
         let is_one = arguments.frames.is_none() && arguments.turntable.is_none();
         let is_wanted = arguments.gi.is_none()
@@ -45,7 +40,7 @@ impl<'a> Beside<'a> {
             && view.width.min(view.height) >= MIN_SIZE
             && arguments.picture.is_denoised(&arguments.pictures())
             && suits(lit.0, view)
-            && memory::check(film_bytes).is_ok();
+            && memory::check(bytes).is_ok();
         Self {
             lit,
             is_wanted,
