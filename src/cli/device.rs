@@ -65,13 +65,17 @@ impl TakeOver<'_> {
 
     /// `None` if, with `auto`, the CPU has to render in place of this outcome.
     pub(super) fn renders_instead<T>(&mut self, outcome: Result<Option<T>>) -> Result<Option<T>> {
-        match outcome {
-            Err(failure) if self.choice == DeviceChoice::Auto => {
-                say(self.notices, format!("{failure}; the CPU renders"));
+        self.takes_over(outcome, "renders")
+    }
+
+    fn takes_over<T>(&mut self, outcome: Result<Option<T>>, does: &str) -> Result<Option<T>> {
+        outcome.or_else(|failure| match self.choice {
+            DeviceChoice::Auto => {
+                say(self.notices, format!("{failure}; the CPU {does}"));
                 Ok(None)
             }
-            outcome => outcome,
-        }
+            _ => Err(failure),
+        })
     }
 
     /// `None` if, with `auto`, the CPU has to go on in place of this outcome.
@@ -80,13 +84,10 @@ impl TakeOver<'_> {
         session: &mut Session<'_>,
         outcome: Result<T>,
     ) -> Result<Option<T>> {
-        match outcome {
-            Err(failure) if self.choice == DeviceChoice::Auto => {
-                say(self.notices, format!("{failure}; the CPU goes on"));
-                session.continue_on_cpu();
-                Ok(None)
-            }
-            outcome => outcome.map(Some),
+        let outcome = self.takes_over(outcome.map(Some), "goes on")?;
+        if outcome.is_none() {
+            session.continue_on_cpu();
         }
+        Ok(outcome)
     }
 }
