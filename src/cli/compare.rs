@@ -22,6 +22,7 @@ pub(super) struct CompareArguments {
 
 /// Prints the errors of a picture against a reference.
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let [(picture, is_linear_picture), (reference, is_linear_reference)] =
         [read(&arguments.picture)?, read(&arguments.reference)?];
     if is_linear_picture != is_linear_reference {

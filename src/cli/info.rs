@@ -25,6 +25,7 @@ pub(super) struct InfoArguments {
 
 /// Prints what is in a scene or a map.
 pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let name = arguments.source.as_str();
     let facts = if crate::sources::is_scene(name) {
         scene_facts(name, crate::sources::scene_with(name, &arguments.of_scene.options())?)

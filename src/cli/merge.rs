@@ -38,6 +38,7 @@ pub(super) struct MergeArguments {
 
 /// Reads, adds up, writes.
 pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let MergeArguments { parts, outputs, picture, .. } = arguments;
     picture.check(outputs)?;
     for (i, output) in outputs.iter().enumerate() {

@@ -156,20 +156,6 @@ fn run(arguments: Arguments) -> Result<()> {
     if !matches!(command, Command::View(_)) {
         memory::refusal_ends();
     }
-    // Others start as many as they are told, or need none.
-    let takes_all = matches!(
-        command,
-        Command::View(_)
-            | Command::Screenshot(_)
-            | Command::Merge(_)
-            | Command::Compare(_)
-            | Command::Info(_)
-            | Command::Sat(_)
-            | Command::Stability(_)
-    );
-    if takes_all {
-        render::start_threads(0)?;
-    }
     match &command {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),

@@ -17,6 +17,7 @@ pub(super) struct SatArguments {
 
 /// Prints one table a map.
 pub(super) fn run(arguments: &SatArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let talks = TALKS_MAPS.map(|(title, (width, height), _)| {
         format!("sky:{}@{width}x{height}", title.to_lowercase())
     });

@@ -131,6 +131,7 @@ fn scale(text: &str) -> std::result::Result<f32, String> {
 
 /// Draws the window's content and writes it.
 pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let path = &arguments.output;
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(Error::at(path, "screenshots are written as .png"));

@@ -38,6 +38,7 @@ pub(super) struct StabilityArguments {
 
 /// Runs the cases, prints a line for each; an error if one fails.
 pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let chosen = choose(arguments)?;
     if arguments.list {
         return chosen.iter().try_for_each(|case| print(case.title()));

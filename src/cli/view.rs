@@ -76,6 +76,7 @@ impl ViewArguments {
 
 /// Opens the window; without a display, says so and renders the picture into a file.
 pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let path = arguments.settings.clone().or_else(Settings::default_path);
     let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
     let (of_scene, lamp_edits) = arguments.of_scene.of_window(Vec::new());
