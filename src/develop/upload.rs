@@ -20,7 +20,8 @@ impl LinearPicture {
     /// A film's sums; `layers` asks for its layers too, where it has them. A film that does not fit
     /// on the device becomes a smaller picture.
     pub(crate) fn of_film(gpu: &Gpu, film: &Film, layers: bool) -> Self {
-        if !Self::fits(gpu, film.width, film.height) {
+        let Film { width, height, .. } = *film;
+        if !Self::fits(gpu, width, height) {
             return Self::of_image(gpu, &film.image());
         }
         let pixels = film.pixels();
@@ -32,32 +33,22 @@ impl LinearPicture {
             let surfaces: Vec<[f32; 8]> = film.surfaces().par_iter().map(sums).collect();
             stored(gpu, &surfaces)
         });
-        Self::fixed(DeviceFilm {
-            sum: stored(gpu, &sums),
-            counts: stored(gpu, &counts),
-            surfaces,
-            width: film.width,
-            height: film.height,
-            scale: 1.0,
-        })
+        let (sum, counts) = (stored(gpu, &sums), stored(gpu, &counts));
+        Self::fixed(DeviceFilm { sum, counts, surfaces, width, height, scale: 1.0 })
     }
 
     /// A picture, smaller if it does not fit on the device.
     pub(crate) fn of_image(gpu: &Gpu, image: &Image) -> Self {
-        let most = most_width(gpu, image.width, image.height);
-        if most < image.width {
+        let Image { width, height, .. } = *image;
+        let most = most_width(gpu, width, height);
+        if most < width {
             return Self::of_image(gpu, &image.shrunk(most));
         }
         let pixels: Vec<[f32; 4]> =
             image.pixels.par_iter().map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
-        Self::fixed(DeviceFilm {
-            sum: stored(gpu, &pixels),
-            counts: stored(gpu, &vec![[1_u32, 0, 0, 0]; pixels.len()]),
-            surfaces: None,
-            width: image.width,
-            height: image.height,
-            scale: 1.0,
-        })
+        let counts = stored(gpu, &vec![[1_u32, 0, 0, 0]; pixels.len()]);
+        let sum = stored(gpu, &pixels);
+        Self::fixed(DeviceFilm { sum, counts, surfaces: None, width, height, scale: 1.0 })
     }
 }
 
