@@ -11,7 +11,7 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::cached_picture::CachedPicture;
 use crate::render::light_groups::LightFactors;
-use crate::render::{CacheTraining, Session, SessionState};
+use crate::render::{CacheTraining, SessionState};
 
 /// What one job leaves for the next.
 #[derive(Default)]
@@ -153,11 +153,6 @@ impl SessionCache {
         Ok(parts.each_ref().map(|part| turned(part, map)))
     }
 
-    /// Whether learning has come to its end in this scene.
-    pub(super) fn has_learned_in(&self, request: &Request) -> bool {
-        self.learned_in(request).is_some_and(|learned| learned.is_complete)
-    }
-
     /// Whether the radiance cache was trained in this scene with this light, near by.
     pub(super) fn has_training_for(&self, request: &Request) -> bool {
         let position = request.view.camera.world_from_camera.translation.into();
@@ -165,13 +160,6 @@ impl SessionCache {
             .as_ref()
             .filter(|(_, of)| Arc::ptr_eq(&of.world, &request.world))
             .is_some_and(|(training, of)| of.is_lit_like(request) && training.suits(position))
-    }
-
-    /// Keeps them for the next session.
-    pub(super) fn keep_training(&mut self, session: &mut Session<'_>, request: &Arc<Request>) {
-        if let Some(training) = session.take_training() {
-            self.training = Some((training, Arc::clone(request)));
-        }
     }
 
     /// Distributions for this request from the last ones, if they are of the same scene.
@@ -192,7 +180,8 @@ impl SessionCache {
         of.is_lit_like(request).then(|| Arc::clone(counted))
     }
 
-    fn learned_in(&self, request: &Request) -> Option<&Learned> {
+    /// The last distributions, if they are of this scene.
+    pub(super) fn learned_in(&self, request: &Request) -> Option<&Learned> {
         self.learned.as_ref().filter(|learned| Arc::ptr_eq(&learned.world, &request.world))
     }
 }
@@ -211,7 +200,7 @@ mod tests {
     use super::*;
     use crate::app::worker::tests::request;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::render::{Gi, View};
+    use crate::render::{Gi, Session, View};
     use crate::scene::{Medium, builtin};
 
     fn lit(sky_name: &str) -> Arc<Environment> {
@@ -227,7 +216,8 @@ mod tests {
         let request = Request { view, wants_cached: true, ..request };
         let mut kept = SessionCache::default();
         let mut session = Session::new(&world, &request.environment, request.view.clone());
-        kept.keep_training(&mut session, &Arc::new(request.clone()));
+        let training = session.take_training();
+        kept.training = training.map(|training| (training, Arc::new(request.clone())));
         let serves = |change: &dyn Fn(&mut Request)| {
             let mut other = request.clone();
             change(&mut other);

@@ -121,7 +121,9 @@ impl<'a> Sessions<'a> {
 
     /// Keeps the radiance cache of a session for the next one.
     pub(super) fn keep_training(&mut self, session: &mut Session<'_>) {
-        self.kept.keep_training(session, &self.watch.request);
+        if let Some(training) = session.take_training() {
+            self.kept.training = Some((training, Arc::clone(&self.watch.request)));
+        }
     }
 
     /// Waits until something else is asked for, or kernels are compiled that were not; whether they are.

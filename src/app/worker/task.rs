@@ -360,7 +360,8 @@ impl<'a> PictureTask<'a> {
         let is_done = main.phase() == Phase::Rendering;
         // A little learned is better than nothing, but what was learned to the end is better still.
         let has_some = main.figures().learned_cells > 0;
-        if is_done || has_some && !self.sessions.kept.has_learned_in(self.request()) {
+        let before = self.sessions.kept.learned_in(self.request());
+        if is_done || has_some && !before.is_some_and(|learned| learned.is_complete) {
             self.keep_distributions(main, is_done);
         }
     }
