@@ -50,16 +50,11 @@ impl Album {
         let thread = std::thread::Builder::new()
             .name("kept pictures".to_owned())
             .spawn(move || {
-                let (found, failures) = read_all(&place);
+                let (found, failure) = read_all(&place);
                 report(Ok(found));
-                if let Some(sentence) = failures {
-                    report(Err(sentence));
-                }
-                for job in orders {
-                    if let Err(error) = job() {
-                        report(Err(error));
-                    }
-                }
+                let failures = failure.into_iter();
+                let failures = failures.chain(orders.into_iter().filter_map(|job| job().err()));
+                failures.for_each(|error| report(Err(error)));
             })
             .map_err(|error| Error::new(format!("no thread for kept pictures: {error}")))?;
         Ok(Self { folder, jobs, _thread: Joined(Some(thread)), written: 0 })

@@ -126,11 +126,8 @@ impl Inspector {
         }
         let distributions = grid.distributions();
         // The first distribution is the whole map's.
-        let sum = |tile| {
-            (1..distributions.len())
-                .map(|distribution| distributions.probability(distribution, tile))
-                .sum()
-        };
+        let own = 1..distributions.len();
+        let sum = |tile| own.clone().map(|own| distributions.probability(own, tile)).sum();
         let sums = (0..distributions.tile_count()).map(sum).collect();
         self.learned = Some((Arc::clone(grid), sums));
     }
@@ -174,14 +171,10 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
     let cell = grid.grid().map(|cells| cells.cell_of(spot.position, spot.normal));
     inspected.distribution = cell.map_or(WHOLE_MAP, |cell| grid.distribution_of_cell(cell));
     let (distributions, distribution) = (grid.distributions(), inspected.distribution);
-    inspected.memory_bytes = (distribution != WHOLE_MAP).then(|| {
-        TileDistributions::distribution_bytes(
-            distributions.tile_count(),
-            distributions.support(distribution),
-        )
-    });
-    inspected.probabilities =
-        (0..distributions.tile_count()).map(|tile| grid.probability(distribution, tile)).collect();
+    let (tiles, support) = (distributions.tile_count(), distributions.support(distribution));
+    let bytes = TileDistributions::distribution_bytes(tiles, support);
+    inspected.memory_bytes = Some(bytes).filter(|_| distribution != WHOLE_MAP);
+    inspected.probabilities = (0..tiles).map(|tile| grid.probability(distribution, tile)).collect();
     if let (Some(cells), Some(cell)) = (grid.grid(), cell) {
         inspected.cell = Some((cell, cells.coordinates(cell).into()));
         if let Some(learning) = snapshot.counters.as_ref().filter(|l| l.grid == *cells)

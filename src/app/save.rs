@@ -105,11 +105,8 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
 fn edits(picture: &Picture) -> Vec<String> {
     let LoadedScene { changes, materials, .. } = &picture.scene;
     let name = |number: &u32| Some(&materials.get(*number as usize)?.name);
-    changes
-        .materials
-        .iter()
-        .filter_map(|(number, edit)| Some(edit.to_text(name(number)?)))
-        .collect()
+    let edits = changes.materials.iter();
+    edits.filter_map(|(number, edit)| Some(edit.to_text(name(number)?))).collect()
 }
 
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {

@@ -25,24 +25,18 @@ impl SpeedUp {
             return None;
         }
         // Both are measured against the same light, to which both give the same.
-        let lights: Vec<f64> = main
-            .film
-            .luminance_around()
-            .iter()
-            .zip(plain.film.luminance_around())
-            .map(|(a, b)| 0.5 * (a + b))
-            .collect();
+        let lights = [main, plain].map(|session| session.film.luminance_around());
+        let lights = lights[0].iter().zip(&lights[1]).map(|(a, b)| 0.5 * (a + b));
+        let lights: Vec<f64> = lights.collect();
         let (a, p) = (block_errors(main, &lights), block_errors(plain, &lights));
         let seconds = plain.comparable_seconds? / main.comparable_seconds?;
         let (sum_a, sum_p) = (a.iter().sum::<f64>(), p.iter().sum::<f64>());
         let ratio = |a: f64, p: f64| p / a * seconds;
         let whole = ratio(sum_a, sum_p);
         let count = a.len() as f64;
-        let spread: f64 = a
-            .iter()
-            .zip(&p)
-            .map(|(a, p)| (ratio(sum_a - a, sum_p - p).ln() - whole.ln()).powi(2))
-            .sum();
+        let without = |(a, p): (&f64, &f64)| ratio(sum_a - a, sum_p - p);
+        let without = a.iter().zip(&p).map(without);
+        let spread: f64 = without.map(|ratio| (ratio.ln() - whole.ln()).powi(2)).sum();
         let factor = (STANDARD_ERRORS * (spread * (count - 1.0) / count).sqrt()).exp();
         (whole.is_finite() && factor.is_finite()).then_some(Self { ratio: whole, factor })
     }

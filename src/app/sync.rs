@@ -336,14 +336,12 @@ fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets, messages: &mut Messag
     if edited.document.viewpoint.is_none()
         && let Some(scene) = assets.scene_of(&edited.document)
     {
-        let viewpoint = match edited.place.take().map(|from| start_viewpoint(scene, &from)) {
-            Some(Ok(viewpoint)) => viewpoint,
-            Some(Err(error)) => {
-                messages.error(error.to_string());
-                first_viewpoint(scene)
-            }
-            None => first_viewpoint(scene),
-        };
+        let placed = edited.place.take().map(|from| start_viewpoint(scene, &from)).transpose();
+        let placed = placed.unwrap_or_else(|error| {
+            messages.error(error.to_string());
+            None
+        });
+        let viewpoint = placed.unwrap_or_else(|| first_viewpoint(scene));
         edited.put_back(|document| document.viewpoint = Some(viewpoint));
     }
 }

@@ -173,15 +173,13 @@ fn paint_on(canvas: &Canvas) -> Result<(Painter, Screen)> {
             device: gpu.device.clone(),
             queue: gpu.queue.clone(),
         }),
-        on_surface_status: Arc::new(move |status| match answer(status) {
-            SurfaceErrorAction::SkipFrame => SurfaceErrorAction::SkipFrame,
-            action => {
-                is_stale.store(true, Ordering::Relaxed);
-                match action {
-                    // The next frame does it, when no other thread submits.
-                    SurfaceErrorAction::Reconfigure => SurfaceErrorAction::SkipFrame,
-                    other => other,
-                }
+        on_surface_status: Arc::new(move |status| {
+            let action = answer(status);
+            is_stale.fetch_or(!matches!(action, SurfaceErrorAction::SkipFrame), Ordering::Relaxed);
+            match action {
+                // The next frame does it, when no other thread submits.
+                SurfaceErrorAction::Reconfigure => SurfaceErrorAction::SkipFrame,
+                other => other,
             }
         }),
         ..usual

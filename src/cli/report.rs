@@ -130,10 +130,8 @@ struct SatArguments {
 
 /// A number above 0, at most 1.
 fn share(text: &str) -> std::result::Result<f64, String> {
-    values::positive(text)
-        .ok()
-        .filter(|x| *x <= 1.0)
-        .ok_or_else(|| "expected a number above 0, at most 1".to_owned())
+    let share = values::positive(text).ok().filter(|x| *x <= 1.0);
+    share.ok_or_else(|| "expected a number above 0, at most 1".to_owned())
 }
 
 /// Measures and writes.

@@ -26,11 +26,8 @@ pub(super) fn paint(
         Overlay::CacheCells => levels(&cells),
         Overlay::CacheSamples => {
             let samples = |cell: KnownCell| trained(&cell).then_some(cell.samples as f32);
-            scaled(
-                cells.into_iter().map(|c| c.and_then(samples)),
-                Range::Logarithmic,
-                "samples a cell",
-            )
+            let samples = cells.into_iter().map(|cell| cell.and_then(samples));
+            scaled(samples, Range::Logarithmic, "samples a cell")
         }
         _ => {
             let developed = |cell: KnownCell| {

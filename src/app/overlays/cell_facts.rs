@@ -83,13 +83,8 @@ impl CellFacts {
 
 /// Steradians of every tile.
 fn tile_solid_angles(environment: &Environment) -> Vec<f64> {
-    let edge = |tile: u32, v: f32| {
-        f64::from(environment.direction_in_tile(tile, glam::Vec2::new(0.5, v)).y)
-    };
-    let (columns, _) = environment.tile_grid();
-    (0..environment.tile_count())
-        .map(|tile| {
-            std::f64::consts::TAU / f64::from(columns) * (edge(tile, 0.0) - edge(tile, 1.0))
-        })
-        .collect()
+    let y = |tile: u32, v: f32| environment.direction_in_tile(tile, glam::Vec2::new(0.5, v)).y;
+    let height = |tile: u32| f64::from(y(tile, 0.0)) - f64::from(y(tile, 1.0));
+    let width = std::f64::consts::TAU / f64::from(environment.tile_grid().0);
+    (0..environment.tile_count()).map(|tile| width * height(tile)).collect()
 }

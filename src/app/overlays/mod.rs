@@ -169,6 +169,7 @@ fn relative_error(pixel: &Pixel) -> Option<f32> {
 }
 
 fn with_borders(cells: &[Option<u32>], width: u32, grid: &SphericalGrid) -> Painted {
+    const BORDER: [u8; 3] = [245, 245, 250];
     let labels = labels::of_cells(cells, width);
     let width = width as usize;
     let colors = cells.iter().enumerate().map(|(i, cell)| {
@@ -176,14 +177,12 @@ fn with_borders(cells: &[Option<u32>], width: u32, grid: &SphericalGrid) -> Pain
         let above = if i >= width { cells[i - width] } else { *cell };
         cell.map(|own| {
             let is_border = left != *cell || above != *cell;
-            if is_border { [245, 245, 250] } else { palette::of_number(own) }
+            if is_border { BORDER } else { palette::of_number(own) }
         })
     });
     let shown = cells.iter().flatten().collect::<std::collections::BTreeSet<_>>().len();
-    let legend = Legend::Names(vec![(
-        [245, 245, 250],
-        format!("{shown} of {} cells are in view", grid.cell_count()),
-    )]);
+    let name = format!("{shown} of {} cells are in view", grid.cell_count());
+    let legend = Legend::Names(vec![(BORDER, name)]);
     Painted { colors: colors.collect(), legend, labels }
 }
 

@@ -16,6 +16,7 @@ use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe};
+use crate::app::speed_up::SpeedUp;
 use crate::app::theme;
 use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::app::zoom::Zoom;
@@ -396,13 +397,8 @@ fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     };
     let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| label("plain", plain));
     let name = crate::app::convergence::name_of(snapshot.main.sampling);
-    let speed_up = scope.rendering.speed_up.as_ref().map(|speed_up| {
-        format!(
-            "{:.2} × as fast ({:.2} to {:.2})",
-            speed_up.ratio,
-            speed_up.ratio / speed_up.factor,
-            speed_up.ratio * speed_up.factor
-        )
+    let speed_up = scope.rendering.speed_up.as_ref().map(|SpeedUp { ratio, factor }| {
+        format!("{ratio:.2} × as fast ({:.2} to {:.2})", ratio / factor, ratio * factor)
     });
     wipe_labels(ui, rect, &[plain, label(&name, &snapshot.main)], speed_up.as_deref());
 }
