@@ -166,6 +166,7 @@ fn read(file: &Path) -> Result<KeptPicture> {
         return Err(Error::at(file, "its settings are out of bounds"));
     }
     let of_scene = text(OF_SCENE).map_or(Ok(SceneOptions::default()), serde_json::from_str);
+    let of_scene = of_scene.map_err(not_understood)?;
     // A program that has had the file in its hands may have left none, or a large one.
     let is_small = |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH;
     let small = read_exr_preview(file)?.filter(is_small);
@@ -175,7 +176,7 @@ fn read(file: &Path) -> Result<KeptPicture> {
         summary: text(SUMMARY)?.to_owned(),
         pixels: Arc::new(Pixels::of_file(file.to_owned())),
         document,
-        of_scene: of_scene.map_err(not_understood)?,
+        of_scene,
         small: small.unwrap_or_else(grey),
         texture: None,
         file: Some(file.to_owned()),

@@ -249,10 +249,9 @@ impl Document {
     /// picture, for that may be changed while it is made.
     fn learning_paths(&self, size: [u32; 2]) -> u64 {
         let paths = View::suitable_learning_paths(self.light.sampling, size, None);
-        if self.light.sampling == Sampling::Adaptive {
-            paths.min(MAX_LEARNING_PATHS)
-        } else {
-            paths
+        match self.light.sampling {
+            Sampling::Adaptive => paths.min(MAX_LEARNING_PATHS),
+            _ => paths,
         }
     }
 

@@ -127,7 +127,7 @@ impl Inspector {
         let distributions = grid.distributions();
         // The first distribution is the whole map's.
         let own = 1..distributions.len();
-        let sum = |tile| own.clone().map(|own| distributions.probability(own, tile)).sum();
+        let sum = |tile| own.clone().map(|number| distributions.probability(number, tile)).sum();
         let sums = (0..distributions.tile_count()).map(sum).collect();
         self.learned = Some((Arc::clone(grid), sums));
     }
