@@ -382,7 +382,8 @@ fn lap(start: Instant) -> f64 {
 const STACK_BYTES: u64 = 2 << 20;
 
 /// Starts the threads that share all work, of which there are so many once and for all; 0 is one for each
-/// core. Started when they are first needed, they would panic where the system gives none.
+/// core. Started when they are first needed, they would panic where the system gives none: each command that computes
+/// starts them before.
 pub(super) fn start_threads(threads: u16) -> Result<()> {
     static STARTED: AtomicBool = AtomicBool::new(false);
     if STARTED.swap(true, Ordering::Relaxed) {
