@@ -18,8 +18,10 @@ use crate::sampler::{Sampler, unit_from_bits};
 use crate::scene::surface::SurfacePoint;
 
 /// Parts of their area that are looked at, and paths that look at each side of a part.
-const PARTS: usize = 256;
-const PATHS: u32 = 4;
+const PARTS: usize = 64;
+const PATHS: u32 = 8;
+/// Share of the mean of all parts in what a part counts: few paths are often much brighter or darker.
+const SHARE_OF_ALL: f32 = 0.25;
 /// Keeps their random numbers apart from others.
 const SEED: u32 = 0x7472_616e;
 
@@ -84,10 +86,13 @@ impl PathTracer<'_> {
         let spans = spans(&facets);
         let of_part = |part: usize| radiance_of_part(self, &facets, &spans, part);
         let of_parts: Vec<[f32; 2]> = (0..PARTS).into_par_iter().map(of_part).collect();
+        let mean = |parts: &[[f32; 2]], side: usize| {
+            parts.iter().map(|part| part[side]).sum::<f32>() / parts.len() as f32
+        };
+        let all = [0, 1].map(|side| SHARE_OF_ALL * mean(&of_parts, side));
         let of_facet = |span: &Range<f64>| {
             let parts = &of_parts[parts_of(span)];
-            let mean = |side: usize| parts.iter().map(|part| part[side]).sum::<f32>();
-            [0, 1].map(|side| mean(side) / parts.len() as f32)
+            [0, 1].map(|side| all[side] + (1.0 - SHARE_OF_ALL) * mean(parts, side))
         };
         let radiances: Vec<[f32; 2]> = spans.iter().map(of_facet).collect();
         Some(TranslucentSurfaces::new(scene, &facets, &radiances))

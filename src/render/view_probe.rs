@@ -78,13 +78,10 @@ fn cut_off(lit: Lit<'_>, view: &View) -> CutOff {
     CutOff { by_bounces: mean(|cut| cut.by_bounces), by_interfaces: mean(|cut| cut.by_interfaces) }
 }
 
-/// Paths from each place of the picture that look for translucent surfaces.
-const LOOKS_THROUGH: u32 = 2;
 /// Least share of the light that must come from translucent surfaces to be aimed at.
 const MIN_TRANSLUCENT: f32 = 0.1;
-/// Probability of aiming at them over that share, and the maximum: the rest is found by the other paths alone.
-const AIM_OF_SHARE: f32 = 0.7;
-const MAX_AIM: f32 = 0.5;
+/// Probability of aiming at them over that share: the rest of the light is found by the other paths alone.
+const AIM_OF_SHARE: f32 = 0.5;
 
 /// The lights inside the scene that count, with translucent surfaces to be aimed at if they bring enough of the light;
 /// `None` are all of the world. NEE goes by these distributions.
@@ -106,19 +103,18 @@ pub(super) fn lights_of(
     let size @ [width, height] = view.whole_size();
     let rays = CameraRays::new(&view.camera, width, height);
     let places: Vec<Vec2> = places(size).collect();
-    let of_path = |index: u32| {
-        let place = places[(index / LOOKS_THROUGH) as usize];
-        tracer.light_of_translucent(rays.ray(place, Vec2::ZERO), Sampler::new(SEED, index, 7))
+    let of_path = |index: usize| {
+        let sampler = Sampler::new(SEED, index as u32, PATHS as u32);
+        tracer.light_of_translucent(rays.ray(places[index], Vec2::ZERO), sampler)
     };
-    let of_paths: Vec<[f32; 2]> =
-        (0..LOOKS_THROUGH * places.len() as u32).into_par_iter().map(of_path).collect();
+    let of_paths: Vec<[f32; 2]> = (0..places.len()).into_par_iter().map(of_path).collect();
     let [from_them, all] = [0, 1].map(|i| of_paths.iter().map(|light| light[i]).sum::<f32>());
     let share = from_them / all;
     if share.is_nan() || share < MIN_TRANSLUCENT {
         return chosen;
     }
     if let Some(translucent) = &mut aiming.translucent {
-        translucent.aim_probability = (AIM_OF_SHARE * share).min(MAX_AIM);
+        translucent.aim_probability = AIM_OF_SHARE * share;
     }
     Some(aiming)
 }
@@ -241,7 +237,7 @@ pub(super) mod tests {
         let (_, map, _) = shut_room(&cloth);
         for material in [&cloth, &frosted] {
             let found = probability(material, &map);
-            assert!(found.is_some_and(|found| (0.25..=MAX_AIM).contains(&found)), "{found:?}");
+            assert!(found.is_some_and(|found| (0.15..0.5).contains(&found)), "{found:?}");
         }
         let clear = Material { roughness: 0.0, ..frosted.clone() };
         assert_eq!(probability(&clear, &map), None, "shadow rays follow it");
