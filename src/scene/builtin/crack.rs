@@ -46,13 +46,13 @@ pub(super) fn build() -> Scene {
         });
     }
     for (x, z, s) in [(-1.45, -1.0, 1.0), (-1.50, 0.95, 0.9)] {
-        b.standing(Vec3::new(x, 0.0, z), 30.0, |b| barrel(b, wood, iron, 0.85 * s));
+        b.standing([x, 0.0, z], 30.0, |b| barrel(b, wood, iron, 0.85 * s));
     }
-    b.standing(Vec3::new(0.62, 0.461, 0.20), 30.0, |b| {
+    b.standing([0.62, 0.461, 0.20], 30.0, |b| {
         objects::vase(b, clay, 0.34, &[0.20, 0.34, 0.38, 0.26, 0.11, 0.14]);
     });
-    b.standing(Vec3::new(0.88, 0.461, 0.28), 0.0, |b| objects::bowl(b, copper, 0.11, 0.07));
-    b.standing(Vec3::new(-0.50, 0.982, -0.62), 0.0, |b| {
+    b.standing([0.88, 0.461, 0.28], 0.0, |b| objects::bowl(b, copper, 0.11, 0.07));
+    b.standing([-0.50, 0.982, -0.62], 0.0, |b| {
         objects::vase(b, copper, 0.24, &[0.3, 0.42, 0.36, 0.2, 0.24]);
     });
     for (x, y, z, yaw, half) in [

@@ -179,12 +179,10 @@ impl Builder {
 
     /// A sphere.
     pub(super) fn ball(&mut self, mat: Mat, centre: Vec3, radius: f32) {
-        let n = if radius > 0.3 {
-            24
-        } else if radius > 0.05 {
-            12
-        } else {
-            6
+        let n = match radius {
+            _ if radius > 0.3 => 24,
+            _ if radius > 0.05 => 12,
+            _ => 6,
         };
         self.blob(mat, centre, Vec3::splat(radius), [2.0, 2.0], n);
     }

@@ -117,9 +117,7 @@ pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, heigh
     let (stile, middle) = (0.11, 0.92);
     let (u0, u1) = (u + stile, u + width - stile);
     for [v0, v1] in [[0.22, middle - 0.06], [middle + 0.06, height - 0.12]] {
-        b.part(Affine3A::from_translation(Vec3::Z * 0.010), |b| {
-            panel_moulding(b, leaf, [u0, v0, u1, v1]);
-        });
+        b.moved(Vec3::Z * 0.010, |b| panel_moulding(b, leaf, [u0, v0, u1, v1]));
         b.slab(leaf, [u0 + 0.06, v0 + 0.06, 0.0], [u1 - 0.06, v1 - 0.06, 0.017], 0.007);
     }
     let knob = Vec3::new(u + width - 0.06, 1.02, 0.012);

@@ -49,7 +49,8 @@ pub(super) fn round_table(b: &mut Builder, top: Mat, legs: Mat, radius: f32, hei
 /// room for ornaments: calls `ornament(builder, row, free width)` at the middle of each free stretch.
 pub(super) fn bookcase(
     b: &mut Builder,
-    [wood, book, paper]: [Mat; 3],
+    wood: Mat,
+    book: [Mat; 2],
     [width, height, depth]: [f32; 3],
     rows: u32,
     mut ornament: impl FnMut(&mut Builder, u32, f32),
@@ -76,12 +77,12 @@ pub(super) fn bookcase(
         let filled = inside * stream.between(0.42, 0.80);
         let left = row % 2 == 0;
         let start = if left { -0.5 * inside } else { 0.5 * inside - filled };
-        b.standing(Vec3::new(start, y + t, 0.0), 0.0, |b| {
-            books(b, [book, paper], filled, step - t - 0.02, depth - 0.03, row * 17 + 5);
+        b.standing([start, y + t, 0.0], 0.0, |b| {
+            books(b, book, filled, step - t - 0.02, depth - 0.03, row * 17 + 5);
         });
         let free = inside - filled;
         let middle = if left { 0.5 * (inside - free) } else { 0.5 * (free - inside) };
-        b.standing(Vec3::new(middle, y + t, 0.0), 0.0, |b| ornament(b, row, free));
+        b.standing([middle, y + t, 0.0], 0.0, |b| ornament(b, row, free));
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::{Affine3A, Vec3};
+use glam::Vec3;
 
 use super::mesh::{Builder, Mat, placed};
 
@@ -29,7 +29,7 @@ pub(super) fn arc_lamp(
     let tip = path[path.len() - 1].0;
     path.push((tip - Vec3::Y * 0.08, 0.008));
     b.tube(metal, 14, &path);
-    b.part(Affine3A::from_translation(tip - Vec3::Y * 0.09), |b| {
+    b.moved(tip - Vec3::Y * 0.09, |b| {
         b.drum(metal, [-0.05, 0.03], [0.022, 0.014], 0.003);
         drum_shade(b, shade, 0.21, 0.17, 0.25);
         b.ball(bulb, Vec3::new(0.0, -0.09, 0.0), 0.05);
@@ -124,7 +124,7 @@ pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
         (0.11, h - 0.55),
     ];
     b.lathe(metal, 24, &profile);
-    b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
+    b.moved(Vec3::Y * (h - 0.56), |b| {
         b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
         for k in 0..6 {
             let (s, c) = (k as f32 * PI / 3.0).sin_cos();

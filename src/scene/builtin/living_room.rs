@@ -81,8 +81,8 @@ palette! {
     bark = matte("bark", [0.22, 0.15, 0.10], 0.9),
     glass = materials::glass("vase glass", [0.86, 0.95, 0.93]),
     black = matte("black metal", [0.03, 0.03, 0.03], 0.45),
-    cover = matte("book cover", [0.95; 3], 0.7),
-    paper = matte("paper", [0.78, 0.75, 0.68], 0.9),
+    book: [Mat; 2] = [matte("book cover", [0.95; 3], 0.7), matte("paper", [0.78, 0.75, 0.68], 0.9)]
+        .map(|material| b.material(material)),
     skin = matte("fruit", [0.95; 3], 0.35),
     arts: [Mat; 3] = arts,
 }
@@ -171,16 +171,14 @@ fn pictures(b: &mut Builder, m: &Palette) {
             (m.walnut, m.arts[1], [3.22, 1.62, 0.46, 0.60]),
             (m.walnut, m.arts[2], [3.76, 1.36, 0.40, 0.52]),
         ] {
-            b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                objects::picture(b, [frame, m.white, art], [w, h], 0.07);
-            });
+            b.moved([u, v, 0.0], |b| objects::picture(b, [frame, m.white, art], [w, h], 0.07));
         }
     });
 }
 
 fn seating(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| furniture::rug(b, m.rug, m.linen, [2.9, 2.0]));
-    b.standing(Vec3::new(-0.45, 0.0, -1.92), 0.0, |b| {
+    b.standing([-0.1, 0.0, 0.05], 0.0, |b| furniture::rug(b, m.rug, m.linen, [2.9, 2.0]));
+    b.standing([-0.45, 0.0, -1.92], 0.0, |b| {
         seating::sofa(b, m.velvet, m.walnut, 2.35, 3);
         for (x, z, turn, tone) in [
             (-0.82, -0.02, -18.0, [0.95, 0.93, 0.88]),
@@ -192,90 +190,78 @@ fn seating(b: &mut Builder, m: &Palette) {
             });
         }
     });
-    b.standing(Vec3::new(1.62, 0.0, -0.72), -72.0, |b| {
-        seating::armchair(b, m.boucle, m.oak);
-    });
+    b.standing([1.62, 0.0, -0.72], -72.0, |b| seating::armchair(b, m.boucle, m.oak));
     // A side table within reach of the armchair.
-    b.standing(Vec3::new(1.78, 0.0, -1.62), 0.0, |b| {
+    b.standing([1.78, 0.0, -1.62], 0.0, |b| {
         b.drum(m.black, [0.0, 0.018], [0.15, 0.15], 0.006);
         b.drum(m.black, [0.01, 0.50], [0.012, 0.012], 0.002);
         b.drum(m.walnut, [0.49, 0.512], [0.21, 0.21], 0.006);
-        b.standing(Vec3::new(-0.05, 0.512, 0.02), 24.0, |b| {
-            objects::book_stack(b, [m.cover, m.paper], 2, 8);
-        });
-        b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| objects::mug(b, m.ceramic, m.soil));
+        b.standing([-0.05, 0.512, 0.02], 24.0, |b| objects::book_stack(b, m.book, 2, 8));
+        b.standing([0.11, 0.512, 0.09], 140.0, |b| objects::mug(b, m.ceramic, m.soil));
     });
 }
 
 fn coffee_table(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-0.35, 0.011, -0.10), 0.0, |b| {
+    b.standing([-0.35, 0.011, -0.10], 0.0, |b| {
         furniture::round_table(b, m.walnut, m.walnut, 0.52, 0.40);
-        b.standing(Vec3::new(-0.16, 0.40, -0.18), 0.0, |b| {
+        b.standing([-0.16, 0.40, -0.18], 0.0, |b| {
             objects::vase(b, m.glass, 0.24, &[0.19, 0.26, 0.24, 0.13, 0.15]);
             b.standing(Vec3::Y * 0.012, 0.0, |b| plants::twigs(b, m.bark, m.leaf, 0.50, 12));
         });
-        b.standing(Vec3::new(0.21, 0.40, -0.10), 0.0, |b| {
+        b.standing([0.21, 0.40, -0.10], 0.0, |b| {
             objects::bowl(b, m.brass, 0.15, 0.075);
             objects::fruit(b, m.skin, m.bark, 0.15, 0.008);
         });
-        b.standing(Vec3::new(0.02, 0.40, 0.24), 12.0, |b| {
-            objects::book_stack(b, [m.cover, m.paper], 3, 21);
-        });
-        b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| objects::mug(b, m.ceramic, m.soil));
+        b.standing([0.02, 0.40, 0.24], 12.0, |b| objects::book_stack(b, m.book, 3, 21));
+        b.standing([-0.28, 0.40, 0.14], 200.0, |b| objects::mug(b, m.ceramic, m.soil));
     });
 }
 
 fn library(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-2.83, 0.0, -0.45), 90.0, |b| {
-        furniture::bookcase(b, [m.oak, m.cover, m.paper], [2.1, 2.15, 0.30], 5, |b, row, free| {
-            match row {
-                0 => b.standing(Vec3::ZERO, 0.0, |b| objects::basket(b, m.linen)),
-                1 => objects::vase(b, m.ceramic, 0.26, &[0.18, 0.30, 0.36, 0.26, 0.12, 0.15]),
-                2 => objects::book_stack(b, [m.cover, m.paper], 4, 31),
-                3 => b.ball(m.copper, Vec3::Y * (0.09 - LIFT), 0.09),
-                _ if free > 0.2 => {
-                    let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.11);
-                    b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.07, 0.42, 2));
-                }
-                _ => objects::bowl(b, m.ceramic, 0.1, 0.06),
+    b.standing([-2.83, 0.0, -0.45], 90.0, |b| {
+        furniture::bookcase(b, m.oak, m.book, [2.1, 2.15, 0.30], 5, |b, row, free| match row {
+            0 => b.standing(Vec3::ZERO, 0.0, |b| objects::basket(b, m.linen)),
+            1 => objects::vase(b, m.ceramic, 0.26, &[0.18, 0.30, 0.36, 0.26, 0.12, 0.15]),
+            2 => objects::book_stack(b, m.book, 4, 31),
+            3 => b.ball(m.copper, Vec3::Y * (0.09 - LIFT), 0.09),
+            _ if free > 0.2 => {
+                let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.11);
+                b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.07, 0.42, 2));
             }
+            _ => objects::bowl(b, m.ceramic, 0.1, 0.06),
         });
     });
 }
 
 fn corners(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-2.45, 0.0, -2.1), -20.0, |b| {
+    b.standing([-2.45, 0.0, -2.1], -20.0, |b| {
         lamps::arc_lamp(b, m.brass, [m.shade, m.bulbs[0]], m.stone, 2.05, 0.85);
     });
-    b.standing(Vec3::new(1.25, 0.0, -2.08), 0.0, |b| {
+    b.standing([1.25, 0.0, -2.08], 0.0, |b| {
         let soil = plants::pot(b, m.clay, m.soil, 0.20, 0.36);
         b.standing(Vec3::Y * soil, 40.0, |b| plants::big_leaves(b, m.leaf, 17, 1.25, 3));
     });
-    b.standing(Vec3::new(2.45, 0.0, -2.05), 0.0, |b| {
+    b.standing([2.45, 0.0, -2.05], 0.0, |b| {
         b.drum(m.steel, [0.0, 0.42], [0.17, 0.17], 0.01);
         b.standing(Vec3::Y * 0.42, 0.0, |b| {
             objects::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12]);
         });
     });
-    b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
+    b.moved([-0.35, SIZE[1], -0.1], |b| {
         lamps::pendant(b, m.copper, [m.white, m.bulbs[1]], 0.95, 0.24);
     });
-    b.standing(Vec3::new(2.42, 0.0, 1.52), 0.0, |b| {
+    b.standing([2.42, 0.0, 1.52], 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.40);
         b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 22, 0.95, 14));
     });
     // A console by the door with a lamp.
-    b.standing(Vec3::new(-1.4, 0.0, 2.28), 180.0, |b| {
+    b.standing([-1.4, 0.0, 2.28], 180.0, |b| {
         furniture::table(b, m.walnut, m.walnut, [1.2, 0.36, 0.78]);
-        b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
+        b.standing([-0.38, 0.78, 0.0], 0.0, |b| {
             objects::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
-            b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
-                lamps::drum_shade(b, m.shade, 0.17, 0.13, 0.22);
-            });
+            b.moved([0.0, 0.56, 0.0], |b| lamps::drum_shade(b, m.shade, 0.17, 0.13, 0.22));
             b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
         });
-        b.standing(Vec3::new(0.30, 0.78, 0.02), 5.0, |b| {
-            objects::book_stack(b, [m.cover, m.paper], 4, 3);
-        });
+        b.standing([0.30, 0.78, 0.02], 5.0, |b| objects::book_stack(b, m.book, 4, 3));
     });
 }

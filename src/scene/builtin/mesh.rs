@@ -93,16 +93,26 @@ impl Builder {
         (self.world_from_part, self.normal_from_part) = outer;
     }
 
+    /// Builds a part in a frame whose origin is at `at`.
+    pub(super) fn moved(&mut self, at: impl Into<Vec3>, build: impl FnOnce(&mut Self)) {
+        self.part(Affine3A::from_translation(at.into()), build);
+    }
+
     /// Builds a part that stands at `at`, turned by `yaw_degrees` about +Y.
-    pub(super) fn standing(&mut self, at: Vec3, yaw_degrees: f32, build: impl FnOnce(&mut Self)) {
+    pub(super) fn standing(
+        &mut self,
+        at: impl Into<Vec3>,
+        yaw_degrees: f32,
+        build: impl FnOnce(&mut Self),
+    ) {
         let turn = Quat::from_rotation_y(yaw_degrees.to_radians());
-        self.part(Affine3A::from_rotation_translation(turn, at + Vec3::Y * LIFT), build);
+        self.part(Affine3A::from_rotation_translation(turn, at.into() + Vec3::Y * LIFT), build);
     }
 
     /// Builds a part that stands at `at`, turned by `yaw_degrees` about +Y and `scale` times as large.
     pub(super) fn scaled(
         &mut self,
-        at: Vec3,
+        at: [f32; 3],
         yaw_degrees: f32,
         scale: f32,
         build: impl FnOnce(&mut Self),

@@ -57,9 +57,7 @@ pub(super) fn books(b: &mut Builder, mats: [Mat; 2], width: f32, room: f32, dept
         let z = 0.5 * (depth - d) - back;
         b.part(placed([x + 0.5 * t, 0.0003, z], [0.0, 0.0, leaning]), |b| {
             let rise = 0.5 * t * leaning.to_radians().sin();
-            b.part(Affine3A::from_translation(Vec3::Y * rise), |b| {
-                book(b, mats, [t, h, d], &mut stream);
-            });
+            b.moved(Vec3::Y * rise, |b| book(b, mats, [t, h, d], &mut stream));
         });
         x += (t + 0.0012) / leaning.to_radians().cos();
         if stream.between(0.0, 1.0) < 0.3 {
@@ -78,7 +76,7 @@ pub(super) fn book_stack(b: &mut Builder, mats: [Mat; 2], count: u32, seed: u32)
         let lying = placed([0.0, y + 0.5 * t, 0.0], [90.0, 0.0, 0.0]);
         let turn = Affine3A::from_rotation_y(stream.between(-0.3, 0.3));
         b.part(turn * lying * placed([0.0, 0.0, 0.0], [0.0, 90.0, 0.0]), |b| {
-            b.part(Affine3A::from_translation(Vec3::Y * (-0.13 * size)), |b| {
+            b.moved(Vec3::Y * (-0.13 * size), |b| {
                 book(b, mats, [t, 0.27 * size, 0.20 * size], &mut stream);
             });
         });

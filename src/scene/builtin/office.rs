@@ -66,8 +66,8 @@ palette! {
     clay = matte("terracotta", [0.52, 0.24, 0.14], 0.8),
     soil = matte("soil", [0.06, 0.04, 0.03], 1.0),
     leaf = two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4)),
-    cover = matte("book cover", [0.95; 3], 0.7),
-    paper = matte("paper", [0.78, 0.76, 0.72], 0.9),
+    book: [Mat; 2] = [matte("book cover", [0.95; 3], 0.7), matte("paper", [0.78, 0.76, 0.72], 0.9)]
+        .map(|material| b.material(material)),
     arts: [Mat; 2] = arts,
 }
 
@@ -79,7 +79,7 @@ pub(super) fn build() -> Scene {
     wall_things(b, m);
     for (x, yaw, seed) in [(-1.35, 168.0, 1), (0.95, 205.0, 2)] {
         desk(b, m, x, seed);
-        b.standing(Vec3::new(x + 0.1, 0.0, -0.62), yaw, |b| {
+        b.standing([x + 0.1, 0.0, -0.62], yaw, |b| {
             seating::office_chair(b, m.cloth, m.plastic, m.steel);
         });
     }
@@ -105,21 +105,17 @@ fn shell(b: &mut Builder, m: &Palette) {
             fittings::curtain(b, m.curtain, [u0 - 0.30, u0 + 0.0], [0.95, 2.36], 0.10, 4.0);
             fittings::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
             fittings::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
-            b.part(placed([0.5 * (u0 + u1), 0.0, 0.0], [0.0; 3]), |b| {
-                furniture::radiator(b, m.white, 0.95, 0.78);
-            });
+            b.moved([0.5 * (u0 + u1), 0.0, 0.0], |b| furniture::radiator(b, m.white, 0.95, 0.78));
         }
         let [u0, v0, ..] = WINDOWS[1];
-        b.standing(Vec3::new(u0 + 0.24, v0 + 0.016, -0.02), 0.0, |b| {
+        b.standing([u0 + 0.24, v0 + 0.016, -0.02], 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.055, 0.10);
             b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 8, 0.22, 6));
         });
     });
     b.part(walls[3].frame(), |b| fittings::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
     for x in [-1.35, 0.95] {
-        b.part(placed([x, SIZE[1], -0.9], [0.0; 3]), |b| {
-            lamps::pendant(b, m.lamp, [m.white; 2], 0.85, 0.20);
-        });
+        b.moved([x, SIZE[1], -0.9], |b| lamps::pendant(b, m.lamp, [m.white; 2], 0.85, 0.20));
     }
 }
 
@@ -128,13 +124,9 @@ fn wall_things(b: &mut Builder, m: &Palette) {
     b.part(wall.frame(), |b| {
         let places = [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]];
         for (art, [u, v, w, h]) in m.arts.into_iter().zip(places) {
-            b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                objects::picture(b, [m.oak, m.white, art], [w, h], 0.06);
-            });
+            b.moved([u, v, 0.0], |b| objects::picture(b, [m.oak, m.white, art], [w, h], 0.06));
         }
-        b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
-            objects::clock(b, m.steel, m.white, m.plastic, 0.16);
-        });
+        b.moved([1.83, 1.95, 0.0], |b| objects::clock(b, m.steel, m.white, m.plastic, 0.16));
         for (y, seed) in [(1.52, 5), (1.92, 9)] {
             b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
             for u in [3.35, 5.05] {
@@ -142,14 +134,14 @@ fn wall_things(b: &mut Builder, m: &Palette) {
                 b.slab(m.steel, [left, y - 0.16, -0.008], [right, y + 0.002, 0.008], 0.002);
                 b.slab(m.steel, [left, y - 0.012, -0.002], [right, y + 0.003, 0.20], 0.002);
             }
-            b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
-                objects::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);
+            b.standing([3.22, y + 0.03, 0.13], 0.0, |b| {
+                objects::books(b, m.book, 1.25, 0.30, 0.22, seed);
             });
         }
-        b.standing(Vec3::new(4.85, 1.55, 0.12), 0.0, |b| {
+        b.standing([4.85, 1.55, 0.12], 0.0, |b| {
             objects::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16]);
         });
-        b.standing(Vec3::new(4.85, 1.95, 0.12), 0.0, |b| {
+        b.standing([4.85, 1.95, 0.12], 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.075, 0.12);
             b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.075, 0.5, 3));
         });
@@ -159,13 +151,13 @@ fn wall_things(b: &mut Builder, m: &Palette) {
 fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
     let height = 0.74;
     let mirror = if seed == 1 { 1.0 } else { -1.0 };
-    b.standing(Vec3::new(x, 0.0, -1.45), 0.0, |b| {
+    b.standing([x, 0.0, -1.45], 0.0, |b| {
         furniture::table(b, m.oak, m.oak, [1.6, 0.8, height]);
-        b.standing(Vec3::new(0.52 * mirror, 0.0, -0.04), 0.0, |b| {
+        b.standing([0.52 * mirror, 0.0, -0.04], 0.0, |b| {
             furniture::drawers(b, m.white, m.steel, [0.36, 0.58, 0.52], [1, 3]);
         });
         let mut on_top = |x: f32, z: f32, yaw: f32, build: &mut dyn FnMut(&mut Builder)| {
-            b.standing(Vec3::new(x * mirror, height, z), yaw, |b| build(b));
+            b.standing([x * mirror, height, z], yaw, |b| build(b));
         };
         on_top(0.05, -0.18, -4.0 * mirror, &mut |b| {
             desktop::monitor(b, m.plastic, m.screen, [0.60, 0.36]);
@@ -173,47 +165,39 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
         on_top(0.03, 0.16, 2.0, &mut |b| desktop::keyboard(b, m.plastic, m.keys));
         on_top(0.34 * mirror, 0.17, -6.0, &mut |b| desktop::mouse(b, m.plastic));
         on_top(-0.62, -0.22, 40.0 * mirror, &mut |b| lamps::desk_lamp(b, m.lamp, m.white));
-        on_top(-0.48, 0.18, 14.0, &mut |b| desktop::papers(b, m.paper, 5, seed));
+        on_top(-0.48, 0.18, 14.0, &mut |b| desktop::papers(b, m.book[1], 5, seed));
         on_top(0.60, 0.10, 60.0, &mut |b| objects::mug(b, m.ceramic, m.soil));
-        on_top(0.66, -0.24, 0.0, &mut |b| desktop::pencils(b, m.steel, m.cover));
-        on_top(0.46, -0.26, 80.0, &mut |b| {
-            objects::book_stack(b, [m.cover, m.paper], 3, seed + 40);
-        });
+        on_top(0.66, -0.24, 0.0, &mut |b| desktop::pencils(b, m.steel, m.book[0]));
+        on_top(0.46, -0.26, 80.0, &mut |b| objects::book_stack(b, m.book, 3, seed + 40));
     });
-    b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| objects::basket(b, m.steel));
+    b.standing([x - 0.95 * mirror, 0.0, -1.35], 0.0, |b| objects::basket(b, m.steel));
 }
 
 fn lounge(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-0.5, 0.0, 0.75), 0.0, |b| furniture::rug(b, m.rug, m.fringe, [2.6, 1.7]));
-    b.standing(Vec3::new(-0.2, 0.0, 1.48), 180.0, |b| {
+    b.standing([-0.5, 0.0, 0.75], 0.0, |b| furniture::rug(b, m.rug, m.fringe, [2.6, 1.7]));
+    b.standing([-0.2, 0.0, 1.48], 180.0, |b| {
         seating::sofa(b, m.sofa, m.oak, 1.9, 2);
         b.part(placed([-0.55, 0.69, 0.0], [68.0, -16.0, 0.0]), |b| {
             b.tinted([1.5, 0.95, 0.30], |b| seating::pillow(b, m.sofa, 0.21));
         });
     });
-    b.standing(Vec3::new(-1.75, 0.0, 1.25), 120.0, |b| seating::side_chair(b, m.oak, m.cloth));
-    b.standing(Vec3::new(2.82, 0.0, -0.85), -90.0, |b| {
-        furniture::bookcase(
-            b,
-            [m.oak, m.cover, m.paper],
-            [1.9, 2.0, 0.32],
-            5,
-            |b, row, _| match row {
-                0 => objects::basket(b, m.fringe),
-                2 => objects::vase(b, m.clay, 0.24, &[0.18, 0.30, 0.34, 0.2, 0.13]),
-                4 => b.ball(m.brass, Vec3::Y * 0.08, 0.08),
-                _ => objects::book_stack(b, [m.cover, m.paper], 3, row + 60),
-            },
-        );
+    b.standing([-1.75, 0.0, 1.25], 120.0, |b| seating::side_chair(b, m.oak, m.cloth));
+    b.standing([2.82, 0.0, -0.85], -90.0, |b| {
+        furniture::bookcase(b, m.oak, m.book, [1.9, 2.0, 0.32], 5, |b, row, _| match row {
+            0 => objects::basket(b, m.fringe),
+            2 => objects::vase(b, m.clay, 0.24, &[0.18, 0.30, 0.34, 0.2, 0.13]),
+            4 => b.ball(m.brass, Vec3::Y * 0.08, 0.08),
+            _ => objects::book_stack(b, m.book, 3, row + 60),
+        });
     });
-    b.standing(Vec3::new(-2.58, 0.0, -1.55), 0.0, |b| {
+    b.standing([-2.58, 0.0, -1.55], 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.34);
         b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 15, 1.15, 5));
     });
-    b.standing(Vec3::new(-2.70, 0.0, 0.0), 90.0, |b| {
+    b.standing([-2.70, 0.0, 0.0], 90.0, |b| {
         furniture::drawers(b, m.white, m.steel, [0.7, 0.95, 0.40], [1, 3]);
-        b.standing(Vec3::new(-0.15, 0.95, 0.0), 10.0, |b| desktop::papers(b, m.paper, 4, 9));
-        b.standing(Vec3::new(0.18, 0.95, -0.02), 0.0, |b| {
+        b.standing([-0.15, 0.95, 0.0], 10.0, |b| desktop::papers(b, m.book[1], 4, 9));
+        b.standing([0.18, 0.95, -0.02], 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.08, 0.13);
             b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 12, 0.3, 15));
         });

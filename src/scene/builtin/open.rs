@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
 use super::mesh::{Builder, Mat, placed};
@@ -29,14 +29,14 @@ pub(super) fn build() -> Scene {
     b.standing(Vec3::Y * 0.32, 0.0, |b| knot(b, bronze));
     b.ball(red, Vec3::new(-1.9, 0.70, -0.7), 0.70);
     b.ball(steel, Vec3::new(-1.05, 0.26, 0.75), 0.26);
-    b.standing(Vec3::new(1.75, 0.0, -0.9), 25.0, |b| {
+    b.standing([1.75, 0.0, -0.9], 25.0, |b| {
         b.slab(stone, [-0.55, 0.0, -0.55], [0.55, 1.1, 0.55], 0.03);
         b.standing(Vec3::Y * 1.1, 0.0, |b| {
             objects::vase(b, blue, 0.62, &[0.2, 0.36, 0.40, 0.27, 0.11, 0.17]);
         });
     });
-    b.standing(Vec3::new(1.35, 0.0, 0.75), -20.0, |b| bench(b, wood, steel));
-    b.standing(Vec3::new(-3.3, 0.0, -2.6), 12.0, |b| {
+    b.standing([1.35, 0.0, 0.75], -20.0, |b| bench(b, wood, steel));
+    b.standing([-3.3, 0.0, -2.6], 12.0, |b| {
         for (k, turn) in [0.0, 16.0, -9.0, 30.0].into_iter().enumerate() {
             let s = 0.48 - 0.075 * k as f32;
             b.part(placed([0.0, 0.62 * k as f32 + 0.001 * k as f32, 0.0], [0.0, turn, 0.0]), |b| {
@@ -44,7 +44,7 @@ pub(super) fn build() -> Scene {
             });
         }
     });
-    b.standing(Vec3::new(3.6, 0.0, -3.2), 0.0, |b| {
+    b.standing([3.6, 0.0, -3.2], 0.0, |b| {
         objects::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13]);
     });
     b.camera("terrace", [0.6, 1.6, 6.0], [0.0, 0.78, 0.0], 40.0);
@@ -65,7 +65,7 @@ fn knot(b: &mut Builder, mat: Mat) {
         let (s2, c2) = (2.0 * t).sin_cos();
         Vec3::new(s1 + 2.0 * s2, c1 - 2.0 * c2, -(3.0 * t).sin()) * 0.235
     };
-    b.part(Affine3A::from_translation(Vec3::Y * 0.80), |b| {
+    b.moved(Vec3::Y * 0.80, |b| {
         b.sheet(mat, [240, 24], Vec2::new(6.0, 0.8), |u, v| {
             let t = u * TAU;
             let forward = (curve(t + 1e-2) - curve(t - 1e-2)).normalize();

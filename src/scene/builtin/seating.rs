@@ -152,12 +152,7 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
             (Vec3::new(sx * 0.285, 0.66, -0.03), 0.014),
         ];
         b.tube(plastic, 12, &path);
-        b.blob(
-            plastic,
-            Vec3::new(sx * 0.285, 0.675, 0.0),
-            Vec3::new(0.04, 0.016, 0.13),
-            [4.0, 3.0],
-            8,
-        );
+        let (middle, half) = (Vec3::new(sx * 0.285, 0.675, 0.0), Vec3::new(0.04, 0.016, 0.13));
+        b.blob(plastic, middle, half, [4.0, 3.0], 8);
     }
 }

@@ -87,15 +87,13 @@ fn tea(b: &mut Builder) {
     let black = b.material(matte("ebony", [0.02, 0.018, 0.016], 0.3));
     let glaze = b.material(matte("blue glaze", [0.035, 0.13, 0.30], 0.12));
     let tea = b.material(matte("tea", [0.10, 0.045, 0.008], 0.02));
-    b.standing(Vec3::new(-0.24, 0.0, 0.0), 0.0, |b| {
+    b.standing([-0.24, 0.0, 0.0], 0.0, |b| {
         tableware::runner(b, organza, 0.56, [-0.20, 0.262], 0.30);
     });
     let on_cloth = 0.003;
-    b.scaled(Vec3::new(-0.30, on_cloth, 0.03), -24.0, 1.35, |b| {
-        tableware::teapot(b, lacquer, black);
-    });
+    b.scaled([-0.30, on_cloth, 0.03], -24.0, 1.35, |b| tableware::teapot(b, lacquer, black));
     for (x, z) in [(-0.06, 0.08), (-0.04, 0.195)] {
-        b.scaled(Vec3::new(x, on_cloth, z), 0.0, 1.2, |b| {
+        b.scaled([x, on_cloth, z], 0.0, 1.2, |b| {
             objects::bowl(b, glaze, 0.045, 0.048);
             b.lathe(tea, 40, &[(0.0425, 0.036), (0.0, 0.036)]);
         });
@@ -117,13 +115,11 @@ fn metals(b: &mut Builder) {
         iridescence_thickness: [0.0, 380.0],
         ..metal("anodised titanium", [0.54, 0.50, 0.45], 0.15)
     });
-    b.scaled(Vec3::new(0.37, 0.0, 0.02), 0.0, 1.15, |b| {
+    b.scaled([0.37, 0.0, 0.02], 0.0, 1.15, |b| {
         objects::bowl(b, copper, 0.15, 0.085);
         objects::fruit(b, skin, stalk, 0.15, 0.010);
     });
-    b.standing(Vec3::new(0.60, 0.0, 0.15), 0.0, |b| {
-        b.ball(titanium, Vec3::Y * 0.048, 0.048);
-    });
+    b.standing([0.60, 0.0, 0.15], 0.0, |b| b.ball(titanium, Vec3::Y * 0.048, 0.048));
 }
 
 /// Thin and solid glass.
@@ -154,8 +150,8 @@ fn glasses(b: &mut Builder) {
         ..solid("sea glass", 0.3)
     });
     let flint = b.material(Material { ior: 1.8, dispersion: 4.0, ..solid("flint glass", 0.0) });
-    b.standing(Vec3::new(0.10, 0.0, -0.11), 0.0, |b| tableware::carafe(b, clear, drink, 0.32));
-    b.standing(Vec3::new(-0.60, 0.0, -0.10), 0.0, |b| {
+    b.standing([0.10, 0.0, -0.11], 0.0, |b| tableware::carafe(b, clear, drink, 0.32));
+    b.standing([-0.60, 0.0, -0.10], 0.0, |b| {
         let shape = [
             (0.0, 0.001),
             (0.045, 0.002),
@@ -167,7 +163,7 @@ fn glasses(b: &mut Builder) {
         ];
         b.lathe(frosted, 64, &tableware::smooth(&shape, 6));
     });
-    b.scaled(Vec3::new(-0.67, 0.0, 0.10), 0.0, 1.2, |b| {
+    b.scaled([-0.67, 0.0, 0.10], 0.0, 1.2, |b| {
         let shape = [
             (0.0, 0.001),
             (0.03, 0.003),
@@ -188,7 +184,7 @@ fn glasses(b: &mut Builder) {
         (0.32, 0.215, 75.0, [0.026, 0.014, 0.020]),
         (0.05, 0.225, 130.0, [0.027, 0.015, 0.021]),
     ] {
-        b.standing(Vec3::new(x, 0.0, z), turn, |b| {
+        b.standing([x, 0.0, z], turn, |b| {
             b.blob(pebble, Vec3::Y * half[1], Vec3::from(half), [2.4, 2.2], 12);
         });
     }
@@ -210,9 +206,7 @@ fn cloths(b: &mut Builder) {
         iridescence_thickness: [0.0, 430.0],
         ..two_sided(metal("mother of pearl", [0.80, 0.76, 0.72], 0.2))
     });
-    b.part(placed([0.835, 0.055, 0.05], [0.0, -14.0, 0.0]), |b| {
-        seating::pillow(b, velvet, 0.16);
-    });
+    b.part(placed([0.835, 0.055, 0.05], [0.0, -14.0, 0.0]), |b| seating::pillow(b, velvet, 0.16));
     b.part(placed([0.835, 0.209, 0.05], [-28.0, -20.0, 15.0]), |b| {
         tableware::nautilus(b, nacre, 0.12);
     });
@@ -241,15 +235,15 @@ fn translucent(b: &mut Builder) {
     let black = b.material(matte("wick", [0.02; 3], 0.9));
     let ceramic = b.material(materials::ceramic());
     let soil = b.material(matte("soil", [0.06, 0.04, 0.03], 1.0));
-    b.scaled(Vec3::new(-0.85, 0.0, -0.05), 0.0, 1.1, |b| {
+    b.scaled([-0.85, 0.0, -0.05], 0.0, 1.1, |b| {
         let ground = plants::pot(b, ceramic, soil, 0.085, 0.14);
         b.standing(Vec3::Y * ground, 70.0, |b| plants::big_leaves(b, leaf, 11, 0.40, 6));
     });
     for (x, z, radius, height) in
         [(0.56, -0.16, 0.040, 0.22), (0.64, -0.14, 0.036, 0.14), (0.585, -0.07, 0.035, 0.085)]
     {
-        b.standing(Vec3::new(x, 0.0, z), 0.0, |b| tableware::candle(b, wax, black, radius, height));
+        b.standing([x, 0.0, z], 0.0, |b| tableware::candle(b, wax, black, radius, height));
     }
-    b.standing(Vec3::new(0.80, 0.40, -0.08), 0.0, |b| tableware::lantern(b, paper, 0.17));
+    b.standing([0.80, 0.40, -0.08], 0.0, |b| tableware::lantern(b, paper, 0.17));
     b.rod(black, Vec3::new(0.80, 0.66, -0.08), Vec3::new(0.80, 1.6, -0.08), 0.002);
 }

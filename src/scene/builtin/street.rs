@@ -105,7 +105,7 @@ fn street(name: &str) -> Builder {
     let (right, left) = (2.55, -1.75);
     let on_right = [-24.0, -17.0, -10.0, -3.0, 4.0].map(|z| (right, z));
     for (x, z) in on_right.into_iter().chain([(left, -20.5), (left, -13.5)]) {
-        b.standing(Vec3::new(x, 0.0, z), 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
+        b.standing([x, 0.0, z], 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
     }
     builder
 }
@@ -127,7 +127,7 @@ fn arcade(b: &mut Builder, m: &Palette) {
     let stone = m.stone_house.trim;
     let (x, z0, bay, spring, top) = (3.25, -9.0, 2.33, 2.35, 3.75);
     for k in 0..7 {
-        b.standing(Vec3::new(x + 0.2, 0.09, z0 + bay * k as f32), 0.0, |b| {
+        b.standing([x + 0.2, 0.09, z0 + bay * k as f32], 0.0, |b| {
             facade::column(b, stone, spring - 0.09, 0.17);
         });
     }
@@ -153,7 +153,7 @@ fn arcade(b: &mut Builder, m: &Palette) {
 
 fn cafe(b: &mut Builder, m: &Palette) {
     for z in [-6.8, -3.2, 0.4, 3.8] {
-        b.standing(Vec3::new(-2.3, 0.09, z), 0.0, |b| {
+        b.standing([-2.3, 0.09, z], 0.0, |b| {
             b.drum(m.iron, [-0.01, 0.05], [0.09, 0.08], 0.01);
             b.drum(m.iron, [0.03, 2.86], [0.032, 0.028], 0.004);
             b.ball(m.iron, Vec3::Y * 2.88, 0.05);
@@ -174,21 +174,21 @@ fn cafe(b: &mut Builder, m: &Palette) {
     for (k, (x, z)) in
         [(-4.0, -4.9), (-5.6, -3.0), (-3.5, -1.6), (-5.3, 0.4), (-3.7, 2.0)].into_iter().enumerate()
     {
-        b.standing(Vec3::new(x, 0.09, z), 25.0 * k as f32, |b| {
+        b.standing([x, 0.09, z], 25.0 * k as f32, |b| {
             b.drum(m.iron, [0.0, 0.03], [0.22, 0.20], 0.008);
             b.drum(m.iron, [0.02, 0.70], [0.025, 0.022], 0.004);
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
             for (x, z, yaw) in [(0.12, 0.05, 60.0), (-0.15, 0.10, 200.0)] {
-                b.standing(Vec3::new(x, 0.728, z), yaw, |b| objects::mug(b, m.ceramic, m.coffee));
+                b.standing([x, 0.728, z], yaw, |b| objects::mug(b, m.ceramic, m.coffee));
             }
-            b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
+            b.standing([-0.02, 0.728, -0.10], 0.0, |b| {
                 b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);
                 let half = Vec3::new(0.05, 0.06, 0.05);
                 plants::foliage(b, m.leaf, Vec3::Y * 0.10, half, 24, 0.05, k as u32);
             });
             for turn in [0.0, 130.0, 235.0].into_iter().take(2 + k % 2) {
                 let (s, c) = f32::to_radians(turn + 7.0 * k as f32).sin_cos();
-                b.standing(Vec3::new(0.68 * s, 0.0, 0.68 * c), 180.0 + turn, |b| {
+                b.standing([0.68 * s, 0.0, 0.68 * c], 180.0 + turn, |b| {
                     seating::side_chair(b, m.wood, m.cane);
                 });
             }
@@ -199,7 +199,7 @@ fn cafe(b: &mut Builder, m: &Palette) {
 fn greenery(b: &mut Builder, m: &Palette) {
     for (x, z, height, seed) in [(1.7, -14.0, 5.6, 1), (1.75, -21.5, 5.2, 2), (-1.2, -9.2, 4.8, 4)]
     {
-        b.standing(Vec3::new(x, 0.0, z), seed as f32 * 50.0, |b| {
+        b.standing([x, 0.0, z], seed as f32 * 50.0, |b| {
             plants::tree(b, m.bark, m.leaf, height, 1250, seed);
             b.drum(m.iron, [-0.01, 0.012], [0.55, 0.55], 0.004);
         });
@@ -208,7 +208,7 @@ fn greenery(b: &mut Builder, m: &Palette) {
         .into_iter()
         .enumerate()
     {
-        b.standing(Vec3::new(x, 0.09, z), 20.0 * k as f32, |b| {
+        b.standing([x, 0.09, z], 20.0 * k as f32, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.27, 0.46);
             let (centre, half) = (Vec3::Y * (soil + 0.26), Vec3::new(0.30, 0.32, 0.30));
             plants::foliage(b, m.leaf, centre, half, 300, 0.10, k as u32 + 3);
