@@ -54,7 +54,10 @@ pub fn build(name: &str, width: u32, height: u32) -> Result<Image> {
         "hallway" => (hallway, Vec::new()),
         _ => return Err(unknown(name)),
     };
-    let mut image = smooth_part(smooth, width, height);
+    // The smooth part is averaged over texels, or interpolated from a grid.
+    let grid = averaged(smooth, width.min(SMOOTH_WIDTH), height.min(SMOOTH_WIDTH / 2));
+    let is_whole = (grid.width, grid.height) == (width, height);
+    let mut image = if is_whole { grid } else { enlarged(&grid, width, height) };
     for disc in &discs {
         add_disc(&mut image, disc);
     }
@@ -239,15 +242,6 @@ fn hallway(d: Vec3) -> Vec3 {
             if door { glass } else { Vec3::new(0.52, 0.48, 0.41) }
         }
     }
-}
-
-/// The smooth part at any resolution: averaged over texels, or interpolated from a grid.
-fn smooth_part(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
-    if width > SMOOTH_WIDTH || height > SMOOTH_WIDTH / 2 {
-        let grid = averaged(radiance, width.min(SMOOTH_WIDTH), height.min(SMOOTH_WIDTH / 2));
-        return enlarged(&grid, width, height);
-    }
-    averaged(radiance, width, height)
 }
 
 /// Means of `radiance` over the solid angle of each texel.

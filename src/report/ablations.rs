@@ -24,8 +24,11 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
         let group = method.group.unwrap_or_default();
         let is_in =
             |word: &String| group.contains(word.as_str()) || method.name.contains(word.as_str());
-        let can_be_measured =
-            is_on_gpus(&method.settings) || !effort.devices.contains(&Device::Gpu);
+        // What is only measured is left to the CPU.
+        let is_on_gpus = method.settings.table == TableKind::TileLocal
+            && method.settings.points == Points::Sobol
+            && method.settings.distributions.recording != Recording::VisibleCosineSquared;
+        let can_be_measured = is_on_gpus || !effort.devices.contains(&Device::Gpu);
         can_be_measured && (only.is_empty() || only.iter().any(is_in))
     };
     let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
@@ -46,13 +49,6 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
         reference: None,
         command,
     }
-}
-
-/// Whether GPUs have it: what is only measured is left to the CPU.
-fn is_on_gpus(settings: &Settings) -> bool {
-    settings.table == TableKind::TileLocal
-        && settings.points == Points::Sobol
-        && settings.distributions.recording != Recording::VisibleCosineSquared
 }
 
 /// Groups of the variants, in order.

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::machine::OpenDevice;
-use super::measure::{Place, Run};
+use super::measure::Run;
 use super::pages::duration;
-use super::plan::{MIN_PICTURES, Method, Plan, Settings};
+use super::plan::{MIN_PICTURES, Method, Plan};
 use super::prepared_row::PreparedRow;
 use super::reference::Reference;
 use super::store::Store;
@@ -54,16 +54,6 @@ pub(super) struct RowState {
 }
 
 impl Context<'_> {
-    /// The place of a row's runs with these settings on a device.
-    pub(super) fn place<'s>(
-        &'s self,
-        state: &'s RowState,
-        device: usize,
-        settings: &Settings,
-    ) -> Place<'s> {
-        state.prepared.place(settings, (&self.devices[device], self.options.cancel))
-    }
-
     pub(super) fn is_cancelled(&self) -> bool {
         self.options.cancel.load(Ordering::Relaxed)
     }

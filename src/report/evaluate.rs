@@ -14,7 +14,7 @@ use crate::render::Sampling;
 impl Context<'_> {
     /// Adds pictures to the reference until it has `pictures` of them; `false` if it was cancelled.
     pub(super) fn grow_reference(&self, state: &mut RowState, pictures: u32) -> Result<bool> {
-        let fastest = self.fastest(state);
+        let on = (&self.devices[self.fastest(state)], self.options.cancel);
         let settings = &Settings::of(Sampling::Adaptive);
         let Some(mut reference) = state.reference.take() else { return Ok(true) };
         let mut is_whole = true;
@@ -25,7 +25,7 @@ impl Context<'_> {
                 f64::from(pictures - done) * self.plan.effort.seconds,
                 state.rows_after,
             );
-            let place = self.place(state, fastest, settings);
+            let place = state.prepared.place(settings, on);
             is_whole =
                 reference.add_picture(&place, self.plan.effort.seconds)? && !self.is_cancelled();
             if reference.is_black() {
@@ -96,7 +96,8 @@ impl Context<'_> {
                     SHARE_RUNS * self.plan.effort.seconds,
                     state.rows_after,
                 );
-                let place = self.place(state, fastest, &method.settings);
+                let on = (&self.devices[fastest], self.options.cancel);
+                let place = state.prepared.place(&method.settings, on);
                 place.shares(method, (samples / 8).max(4), &reference)
             });
             let Some(found) = found? else { return Ok(false) };

@@ -150,15 +150,15 @@ impl Runner<'_> {
         }
         self.say_run(state, device, method, seed);
         let settings = &plan.methods[method].settings;
-        let on = &self.context.devices[device];
+        let (on, cancel) = (&self.context.devices[device], self.context.options.cancel);
         if on.gpu.is_some() {
             // Kernels are compiled, unless they are cached; a GPU may not support them.
-            let ready = self.context.place(state, device, settings).warm_up(settings);
+            let ready = state.prepared.place(settings, (on, cancel)).warm_up(settings);
             if !self.accept(state, device, &ready) {
                 return Ok(true);
             }
         }
-        let (place, seconds) = (self.context.place(state, device, settings), plan.effort.seconds);
+        let (place, seconds) = (state.prepared.place(settings, (on, cancel)), plan.effort.seconds);
         let measured = place.measure(&plan.methods[method], seed, seconds)?;
         let Some(mut done) = measured else { return Ok(false) };
         if seed == 0 && on.gpu.is_none() {

@@ -93,7 +93,7 @@ pub fn measure_all(
         if let (Some(store), Some(folder)) = (&store, folder) {
             store.write(&key, &all[all.len() - 1])?;
             write_json(&folder.join("sat.json"), &all)?;
-            write_text(&folder.join("sat.csv"), &sat::csv(&all))?;
+            write_text(&folder.join("sat.csv"), &sat::Csv { maps: &all }.to_string())?;
         }
     }
     Ok(all)

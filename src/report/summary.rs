@@ -63,11 +63,6 @@ impl Measure {
             Self::DenoisedFlip => point.denoised_flip,
         }
     }
-
-    /// Whether it has a slope: FLIP has no power law.
-    fn is_power_law(self) -> bool {
-        !matches!(self, Self::Flip | Self::DenoisedFlip)
-    }
 }
 
 /// Mean LDR-FLIP of denoised pictures that people call a draft, a preview and clean.
@@ -324,7 +319,12 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
         .iter()
         .map(|runs| Measure::ALL.map(|m| Bundle::new(&curves(runs, m), plan.effort.seconds)))
         .collect();
-    let efficiencies: Vec<Option<f64>> = runs.iter().map(|runs| efficiency(runs)).collect();
+    // Error times rendering time at the end.
+    let product = |run: &Run| {
+        let last = run.points.last()?;
+        Some(last.errors?.trimmed_rel_mse * last.render_seconds)
+    };
+    let efficiencies: Vec<_> = runs.iter().map(|runs| estimate(runs, product)).collect();
     let speed_ups = |index: usize| {
         let mut found = Vec::new();
         for &baseline in plan.baselines.iter().filter(|b| **b != index) {
@@ -351,15 +351,15 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
                 .as_ref()
                 .map_or([None; 3], |bundle| CLEAN_FLIP.map(|flip| bundle.seconds_to(flip))),
             mean_ratio: estimate(&runs, |run| Some(run.points.last()?.errors?.mean_ratio)),
-            slopes: Measure::ALL
-                .iter()
-                .filter(|m| m.is_power_law())
-                .filter_map(|m| Some((*m, estimate(&runs, |run| slope(run, *m))?)))
+            // FLIP has no power law.
+            slopes: [Measure::TrimmedRelMse, Measure::RelMse, Measure::Mse, Measure::Blocks]
+                .into_iter()
+                .filter_map(|m| Some((m, estimate(&runs, |run| slope(run, m))?)))
                 .collect(),
             speed_ups: speed_ups(index),
             without_learning: efficiencies[plan.baselines[0]]
                 .zip(efficiencies[index])
-                .map(|(baseline, own)| baseline / own),
+                .map(|(baseline, own)| baseline.mean / own.mean),
             costs: costs(&runs, threads),
             memory: max_memory(&runs),
             runs,
@@ -384,15 +384,6 @@ fn slope(run: &Run, measure: Measure) -> Option<f64> {
         .filter_map(|p| Some((p.render_seconds, measure.of(p)?)))
         .collect();
     if points.len() < 3 { None } else { power_law_slope(&points) }
-}
-
-/// Mean of error times rendering time at the end.
-fn efficiency(runs: &[Run]) -> Option<f64> {
-    let product = |run: &Run| {
-        let last = run.points.last()?;
-        Some(last.errors?.trimmed_rel_mse * last.render_seconds)
-    };
-    estimate(runs, product).map(|e| e.mean)
 }
 
 fn costs(runs: &[Run], threads: usize) -> Costs {

@@ -27,35 +27,30 @@ pub(super) const CASES: &[Entry] = &[
     ("1e-3-m-room-on-1e4-m-ground", On::Any, small_beside_large),
 ];
 
-/// A closed box of `2 n^2` triangles a face in `[-size,size]^3`, vertices shared.
-fn cube(n: u32, size: f32) -> Bvh {
+/// A closed box in `[-size,size]^3` whose faces are cut into rectangles, each of them from two coordinates to two.
+fn closed_box(size: f32, mut rectangles: impl FnMut() -> Vec<[[f32; 2]; 2]>) -> Bvh {
     let mut corners = Vec::new();
-    let at = |i: u32| (i as f32 / n as f32 * 2.0 - 1.0) * size;
-    for axis in 0..3 {
-        for side in [-size, size] {
-            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                let point = |i: u32, j: u32| on_face(axis, side, at(i), at(j));
-                let [a, b, c, d] =
-                    [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
-                corners.extend([a, b, c, a, c, d]);
-            }
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, -size), (axis, size)]) {
+        for [[i0, j0], [i1, j1]] in rectangles() {
+            let [a, b, c, d] = [[i0, j0], [i1, j0], [i1, j1], [i0, j1]].map(|[i, j]| {
+                let mut point = Vec3::splat(side);
+                point[(axis + 1) % 3] = i;
+                point[(axis + 2) % 3] = j;
+                point
+            });
+            corners.extend([a, b, c, a, c, d]);
         }
     }
-    tree(&corners)
-}
-
-/// A point of the face of a cube at `side` on an axis, by its coordinates on the next two axes.
-fn on_face(axis: usize, side: f32, i: f32, j: f32) -> Vec3 {
-    let mut point = Vec3::splat(side);
-    point[(axis + 1) % 3] = i;
-    point[(axis + 2) % 3] = j;
-    point
-}
-
-fn tree(corners: &[Vec3]) -> Bvh {
     let triangles: Vec<[u32; 3]> =
         (0..corners.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    Bvh::build(corners, &triangles)
+    Bvh::build(&corners, &triangles)
+}
+
+/// A closed box of `2 n^2` triangles a face in `[-size,size]^3`.
+fn cube(n: u32, size: f32) -> Bvh {
+    let at = |i: u32| (i as f32 / n as f32 * 2.0 - 1.0) * size;
+    let row = |i: u32| (0..n).map(move |j| [[at(i), at(j)], [at(i + 1), at(j + 1)]]);
+    closed_box(size, || (0..n).flat_map(row).collect())
 }
 
 /// Number of rays among `count` that hit nothing.
@@ -164,25 +159,16 @@ fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
 /// A closed box whose walls are cut into strips a millionth as wide as long.
 fn slivers(setting: &Setting) -> Outcome {
     let mut random = SplitMix(8);
-    let mut corners = Vec::new();
-    for axis in 0..3 {
-        for side in [-1.0, 1.0] {
-            // Cuts at random places, in pairs two millionths apart.
-            let mut cuts = vec![-1.0, 1.0];
-            for _ in 0..100 {
-                let at = random.next_f32() * 1.9 - 0.95;
-                cuts.extend([at, at + 2e-6]);
-            }
-            cuts.sort_by(f32::total_cmp);
-            for pair in cuts.windows(2) {
-                let point = |i: f32, j: f32| on_face(axis, side, i, j);
-                let [a, b] = [pair[0], pair[1]];
-                let (p, q, r, s) = (point(a, -1.0), point(b, -1.0), point(b, 1.0), point(a, 1.0));
-                corners.extend([p, q, r, p, r, s]);
-            }
+    // Cuts at random places, in pairs two millionths apart.
+    let tree = closed_box(1.0, || {
+        let mut cuts = vec![-1.0, 1.0];
+        for _ in 0..100 {
+            let at = random.next_f32() * 1.9 - 0.95;
+            cuts.extend([at, at + 2e-6]);
         }
-    }
-    let tree = tree(&corners);
+        cuts.sort_by(f32::total_cmp);
+        cuts.windows(2).map(|pair| [[pair[0], -1.0], [pair[1], 1.0]]).collect()
+    });
     let count = setting.count(2_000_000, 200_000_000);
     let missed =
         leaks(&tree, count, |random| (random.next_in_cube() * 0.9, random.next_direction()));

@@ -30,21 +30,17 @@ impl Measured {
     }
 }
 
+/// All cases as comma-separated values.
 #[derive(Template)]
 #[template(path = "sat.csv", escape = "none")]
-struct Csv<'a> {
-    maps: &'a [Measured],
+pub(in crate::report) struct Csv<'a> {
+    pub(in crate::report) maps: &'a [Measured],
 }
 
 #[derive(Template)]
 #[template(path = "sat.md", escape = "none")]
 struct Markdown<'a> {
     maps: &'a [Measured],
-}
-
-/// All cases as comma-separated values.
-pub(in crate::report) fn csv(maps: &[Measured]) -> String {
-    Csv { maps }.to_string()
 }
 
 /// All cases as one Markdown table, with the talk's errors.
