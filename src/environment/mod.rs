@@ -359,7 +359,10 @@ impl Environment {
 
     /// The table's sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
     pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
-        self.table.tile_sums()
+        match &*self.table {
+            Table::TileLocal(table) => Some(table.sums()),
+            Table::SummedArea(_) => None,
+        }
     }
 
     /// Rotation in turns, in `[0,1)`, and the factor on all radiance.
@@ -369,7 +372,7 @@ impl Environment {
 
     /// Memory of the pixels and of the table.
     pub fn memory_bytes(&self) -> EnvironmentMemory {
-        let rows = self.patches.memory_bytes()
+        let rows = size_of_val(&self.patches.rows[..])
             + size_of_val(&self.importances[..])
             + size_of_val(&self.inverse_energies[..])
             + size_of_val(&self.tile_energies[..]);

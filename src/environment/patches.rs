@@ -68,11 +68,6 @@ impl PatchRows {
         let distance = if (cosine >= 0.0) == from_upper { near } else { 2.0 - near };
         ((distance - top) / extent).clamp(0.0, 1.0)
     }
-
-    /// Bytes held.
-    pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(&self.rows[..])
-    }
 }
 
 /// Number of rows of patches.

@@ -81,14 +81,6 @@ impl Table {
         }
     }
 
-    /// Sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
-    pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
-        match self {
-            Self::TileLocal(table) => Some(table.sums()),
-            Self::SummedArea(_) => None,
-        }
-    }
-
     pub(crate) fn memory_bytes(&self) -> usize {
         match self {
             Self::TileLocal(table) => table.memory_bytes(),

@@ -4,9 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
 use super::mesh::{Builder, Mat, placed};
-use super::objects;
 use super::room::{self, Hole, Shell};
-use super::textures;
+use super::{objects, textures};
 use crate::scene::Scene;
 
 const SIZE: [f32; 3] = [4.0, 2.5, 3.0];

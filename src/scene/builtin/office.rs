@@ -3,15 +3,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::furniture;
 use super::materials::{self, embossed, matte, metal, palette, textured, two_sided, varnished};
 use super::mesh::{Builder, Mat, placed};
-use super::objects;
-use super::plants;
-use super::reliefs;
 use super::room::{self, Hole, Shell};
-use super::textures;
-use super::{desktop, fittings, lamps, seating};
+use super::{desktop, fittings, furniture, lamps, objects, plants, reliefs, seating, textures};
 use crate::scene::Scene;
 
 const SIZE: [f32; 3] = [6.0, 3.0, 4.0];

@@ -6,8 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
 use super::mesh::{Builder, Mat, placed};
-use super::objects;
-use super::textures;
+use super::{objects, textures};
 use crate::scene::Scene;
 
 /// Builds the scene.

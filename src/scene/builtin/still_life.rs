@@ -4,15 +4,9 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{Vec2, Vec3};
 
-use super::furniture;
 use super::materials::{self, embossed, glass, matte, metal, textured, two_sided, varnished};
 use super::mesh::{Builder, placed};
-use super::objects;
-use super::plants;
-use super::reliefs;
-use super::seating;
-use super::tableware;
-use super::textures;
+use super::{furniture, objects, plants, reliefs, seating, tableware, textures};
 use crate::scene::{AlphaMode, Material, Scene};
 
 /// Width, height and depth of the sideboard.

@@ -8,11 +8,8 @@ use glam::{Vec2, Vec3};
 use super::facade::{self, HouseMats};
 use super::materials::{self, matte, palette, textured, two_sided};
 use super::mesh::{Builder, Mat};
-use super::objects;
-use super::plants;
 use super::room::Wall;
-use super::textures;
-use super::{lamps, seating};
+use super::{lamps, objects, plants, seating, textures};
 use crate::scene::{Medium, Scene};
 
 palette! {

@@ -161,7 +161,14 @@ fn read_in(
     };
     let tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
     let look = Look::choose(document, options.variant.as_deref(), &mut notices)?;
-    let used = used_materials(document, &placements, &look)?;
+    // Numbers of the materials that are shown; `None` is the default one.
+    let mut used = BTreeSet::new();
+    for &mesh in placements.keys() {
+        let mesh: Mesh = document.meshes.get_as(json::Index::new(mesh))?;
+        for primitive in mesh.primitives() {
+            used.insert(look.material(&primitive?));
+        }
+    }
     let mut materials = Materials::load(&file, &used, &mut notices)?;
     materials.scale(frame.scale);
     let is_lamp = |primitive: &json::mesh::Primitive| {
@@ -223,22 +230,6 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
     }
     scene.remove_triangles_of(&hulls);
     scene.check_shown()
-}
-
-/// Numbers of the materials that are shown; `None` is the default one.
-fn used_materials(
-    document: &Document<'_>,
-    placements: &BTreeMap<u32, Vec<Placement>>,
-    look: &Look,
-) -> Fallible<BTreeSet<Option<u32>>> {
-    let mut used = BTreeSet::new();
-    for &mesh in placements.keys() {
-        let mesh: Mesh = document.meshes.get_as(json::Index::new(mesh))?;
-        for primitive in mesh.primitives() {
-            used.insert(look.material(&primitive?));
-        }
-    }
-    Ok(used)
 }
 
 /// What meshes are read with.

@@ -90,9 +90,21 @@ impl Nodes {
                 marks[node.value()] = IS_JOINT;
             }
         }
-        let roots = match scene_roots(document, notices)? {
-            Some(roots) => roots,
-            None => hierarchy.tops().map(Index::new).collect(),
+        let scenes = &document.scenes;
+        let roots = if document.scene.is_none() && scenes.len() == 0 {
+            hierarchy.tops().map(Index::new).collect()
+        } else {
+            // The default scene, else the first one.
+            let shown = document.scene.unwrap_or(Index::new(0));
+            if scenes.len() > 1 {
+                notices
+                    .add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
+            }
+            let scene: Tops = scenes.get_as(shown)?;
+            for &node in &scene.nodes {
+                document.nodes.text(node)?;
+            }
+            scene.nodes
         };
         for root in &roots {
             hierarchy.walk(root.value() as u32, |node, _| {
@@ -241,26 +253,6 @@ fn is_hidden(node: &json::Node) -> bool {
     let extension = node.extensions.as_ref();
     let extension = extension.and_then(|all| all.others.get("KHR_node_visibility"));
     extension.and_then(|it| it.get("visible")?.as_bool()) == Some(false)
-}
-
-/// Roots of the default scene, else of the first one; `None` if the file has no scenes.
-fn scene_roots(
-    document: &Document<'_>,
-    notices: &mut Notices,
-) -> Fallible<Option<Vec<Index<json::Node>>>> {
-    let scenes = &document.scenes;
-    if document.scene.is_none() && scenes.len() == 0 {
-        return Ok(None);
-    }
-    let shown = document.scene.unwrap_or(Index::new(0));
-    let scene: Tops = scenes.get_as(shown)?;
-    if scenes.len() > 1 {
-        notices.add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
-    }
-    for &node in &scene.nodes {
-        document.nodes.text(node)?;
-    }
-    Ok(Some(scene.nodes))
 }
 
 /// Parent from node, at rest.
