@@ -6,6 +6,8 @@ use glam::Vec3;
 
 use super::{AlphaMode, Material, Scene, surface};
 
+use SceneFeatures as S;
+
 bitflags::bitflags! {
     /// What a scene uses: what it does without is neither evaluated nor, on a GPU, compiled.
     #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -101,77 +103,64 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(SceneFeatures, &str, Option<&str>); 28] = {
-    use SceneFeatures as S;
-    [
-        (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
-        (S::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
-        (
-            S::SECOND_UV_SET,
-            "A second set of texture coordinates",
-            Some("the second set of texture coordinates: no texture uses it"),
-        ),
-        (S::VERTEX_COLORS, "Vertex colours", Some("vertex colours: no mesh has them")),
-        (S::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
-        (S::ALPHA_BLEND, "Opacity along rays", Some("opacity along rays: no material is blended")),
-        (S::SINGLE_SIDED, "Single-sided surfaces", None),
-        (S::BACKED, "Faces in pairs, front and back", None),
-        (S::METALS, "Metals", None),
-        (
-            S::THIN_TRANSMISSION,
-            "Thin glass",
-            Some("thin glass: no material transmits without volume"),
-        ),
-        (
-            S::SOLID_TRANSMISSION,
-            "Refraction",
-            Some("refraction: no material is a transmitting solid"),
-        ),
-        (
-            S::DIFFUSE_TRANSMISSION,
-            "Diffuse transmission",
-            Some("diffuse transmission: no material has it"),
-        ),
-        (S::ABSORPTION, "Absorption", Some("absorption: no solid absorbs")),
-        (S::FOG, "Fog", Some("fog: the scene has none")),
-        (
-            S::SCATTERING_SOLIDS,
-            "Scattering inside of solids",
-            Some("scattering inside of solids: none is filled"),
-        ),
-        (S::ANISOTROPY, "Anisotropy", Some("anisotropy: no material has a direction")),
-        (S::SHEEN, "Sheen", Some("sheen: no material has it")),
-        (S::IRIDESCENCE, "Iridescence", Some("iridescence: no material has a film")),
-        (S::DISPERSION, "Dispersion", Some("dispersion: no solid bends colours differently")),
-        (S::CLEARCOAT, "Clearcoat", Some("clearcoat: no material is coated")),
-        (S::UNLIT, "Unlit surfaces", None),
-        (S::EMITTERS, "Emissive triangles", Some("sampling of emissive triangles: nothing emits")),
-        (
-            S::PUNCTUAL_LIGHTS,
-            "Point, spot or directional lights",
-            Some("punctual lights: the scene has none"),
-        ),
-        (S::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
-        (S::INSTANCES, "Meshes shared by instances", None),
-        (
-            S::ROUGH_METALS,
-            "Multiple scattering of rough metal",
-            Some("multiple scattering of metal: no metal is rough"),
-        ),
-        (
-            S::ROUGH_GLASS,
-            "Multiple scattering of rough glass",
-            Some("multiple scattering of glass: no glass is rough"),
-        ),
-        (
-            S::LIFTED,
-            "Smooth surfaces above their triangles",
-            Some(
-                "smooth surfaces above triangles: every opaque triangle is as flat as its normals",
-            ),
-        ),
-    ]
-};
+const WORDS: [(S, &str, Option<&str>); 28] = [
+    (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
+    (S::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
+    (
+        S::SECOND_UV_SET,
+        "A second set of texture coordinates",
+        Some("the second set of texture coordinates: no texture uses it"),
+    ),
+    (S::VERTEX_COLORS, "Vertex colours", Some("vertex colours: no mesh has them")),
+    (S::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
+    (S::ALPHA_BLEND, "Opacity along rays", Some("opacity along rays: no material is blended")),
+    (S::SINGLE_SIDED, "Single-sided surfaces", None),
+    (S::BACKED, "Faces in pairs, front and back", None),
+    (S::METALS, "Metals", None),
+    (S::THIN_TRANSMISSION, "Thin glass", Some("thin glass: no material transmits without volume")),
+    (S::SOLID_TRANSMISSION, "Refraction", Some("refraction: no material is a transmitting solid")),
+    (
+        S::DIFFUSE_TRANSMISSION,
+        "Diffuse transmission",
+        Some("diffuse transmission: no material has it"),
+    ),
+    (S::ABSORPTION, "Absorption", Some("absorption: no solid absorbs")),
+    (S::FOG, "Fog", Some("fog: the scene has none")),
+    (
+        S::SCATTERING_SOLIDS,
+        "Scattering inside of solids",
+        Some("scattering inside of solids: none is filled"),
+    ),
+    (S::ANISOTROPY, "Anisotropy", Some("anisotropy: no material has a direction")),
+    (S::SHEEN, "Sheen", Some("sheen: no material has it")),
+    (S::IRIDESCENCE, "Iridescence", Some("iridescence: no material has a film")),
+    (S::DISPERSION, "Dispersion", Some("dispersion: no solid bends colours differently")),
+    (S::CLEARCOAT, "Clearcoat", Some("clearcoat: no material is coated")),
+    (S::UNLIT, "Unlit surfaces", None),
+    (S::EMITTERS, "Emissive triangles", Some("sampling of emissive triangles: nothing emits")),
+    (
+        S::PUNCTUAL_LIGHTS,
+        "Point, spot or directional lights",
+        Some("punctual lights: the scene has none"),
+    ),
+    (S::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
+    (S::INSTANCES, "Meshes shared by instances", None),
+    (
+        S::ROUGH_METALS,
+        "Multiple scattering of rough metal",
+        Some("multiple scattering of metal: no metal is rough"),
+    ),
+    (
+        S::ROUGH_GLASS,
+        "Multiple scattering of rough glass",
+        Some("multiple scattering of glass: no glass is rough"),
+    ),
+    (
+        S::LIFTED,
+        "Smooth surfaces above their triangles",
+        Some("smooth surfaces above triangles: every opaque triangle is as flat as its normals"),
+    ),
+];
 
 impl SceneNeeds {
     /// Looks at every material that a triangle uses.
@@ -181,11 +170,11 @@ impl SceneNeeds {
             used[material as usize] = true;
         }
         let mut needs = Self::default();
-        needs.features.set(SceneFeatures::VERTEX_COLORS, !scene.colors.is_empty());
-        needs.features.set(SceneFeatures::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
-        needs.features.set(SceneFeatures::FOG, scene.medium.is_some());
-        needs.features.set(SceneFeatures::INSTANCES, !scene.instances.is_empty());
-        needs.features.set(SceneFeatures::LIFTED, surface::lifts(scene));
+        needs.features.set(S::VERTEX_COLORS, !scene.colors.is_empty());
+        needs.features.set(S::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
+        needs.features.set(S::FOG, scene.medium.is_some());
+        needs.features.set(S::INSTANCES, !scene.instances.is_empty());
+        needs.features.set(S::LIFTED, surface::lifts(scene));
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
             needs.add(material);
         }
@@ -193,7 +182,6 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
-        use SceneFeatures as S;
         let Self { features, texture_slots } = self;
         for (slot, _) in m.textures.iter().enumerate().filter(|(_, texture)| texture.is_some()) {
             *texture_slots |= 1 << slot;
