@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use image::ImageDecoder;
 
-use super::guard::{decoder_bytes, guarded};
+use super::guard::{guarded, limits};
 use super::{Texels, ktx2, tiff};
 use crate::error::{At as _, Error, Result};
 use crate::memory;
@@ -99,12 +99,8 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     }
     memory::check(header.decoding_bytes()).at(name)?;
     let mut reader = reader(bytes, name)?;
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
     let file_bytes = bytes.len() as u64;
-    limits.max_alloc = Some(MAX_BYTES.min(decoder_bytes(file_bytes)));
-    reader.limits(limits);
+    reader.limits(limits(MAX_SIDE, MAX_BYTES, file_bytes));
     let cause = |cause| decoder_cause(&cause, file_bytes);
     let decoded = guarded(|| reader.decode().map_err(cause)).at(name)?;
     let (width, height) = (decoded.width(), decoded.height());

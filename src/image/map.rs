@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::exr_read::read_exr;
 use super::file::{extension, open_file, read_cause, read_file};
-use super::guard::{decoder_bytes, guarded};
+use super::guard::{guarded, limits};
 use super::hdr::decode_hdr;
 use super::ldr::decoder_cause;
 use super::picture::FilePicture;
@@ -239,10 +239,6 @@ fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
     let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height))?;
     memory::check(decoder.total_bytes())?;
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(MAX_SIDE as u32);
-    limits.max_image_height = Some(MAX_SIDE as u32);
-    limits.max_alloc = Some((MAX_PIXELS * BYTES_PER_PIXEL).min(decoder_bytes(file_bytes)));
-    reader_of_pixels.limits(limits);
+    reader_of_pixels.limits(limits(MAX_SIDE as u32, MAX_PIXELS * BYTES_PER_PIXEL, file_bytes));
     reader_of_pixels.decode().map_err(cause)
 }

@@ -121,15 +121,6 @@ impl Reference {
         Some(Self { facts, sums: sums.to_vec(), squares: squares.to_vec(), path: path.to_owned() })
     }
 
-    fn write(&self) -> Result<()> {
-        let header = serde_json::to_string(&self.facts).at(&self.path)?;
-        write_beside_and_rename(&self.path, |file| {
-            writeln!(file, "{header}")?;
-            let numbers = self.sums.as_flattened().iter().chain(self.squares.as_flattened());
-            numbers.into_iter().try_for_each(|x| file.write_all(&x.to_le_bytes()))
-        })
-    }
-
     /// Renders one more picture with the default sampling and stores it. The first one renders for `seconds`, and
     /// at least as long as it learned; the others take as many samples as the first. `false` if it was cancelled.
     ///
@@ -157,7 +148,12 @@ impl Reference {
         self.add(session.film());
         self.facts.seconds += session.figures().elapsed_seconds();
         place.device.clone_into(&mut self.facts.device);
-        self.write()?;
+        let header = serde_json::to_string(&self.facts).at(&self.path)?;
+        write_beside_and_rename(&self.path, |file| {
+            writeln!(file, "{header}")?;
+            let numbers = self.sums.as_flattened().iter().chain(self.squares.as_flattened());
+            numbers.into_iter().try_for_each(|x| file.write_all(&x.to_le_bytes()))
+        })?;
         Ok(true)
     }
 

@@ -184,10 +184,7 @@ impl<'a> Reader<'a> {
                 Checked::Valid(json::material::AlphaMode::Blend) => AlphaMode::Blend,
                 Checked::Valid(json::material::AlphaMode::Opaque) => AlphaMode::Opaque,
                 Checked::Invalid => {
-                    self.notices.add(format!(
-                        "material {} has an alpha mode that glTF does not know: it is opaque",
-                        self.material.name
-                    ));
+                    self.note("an alpha mode that glTF does not know: it is opaque");
                     AlphaMode::Opaque
                 }
             },
@@ -290,10 +287,8 @@ impl<'a> Reader<'a> {
         let transform = info.transform.as_ref();
         let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
         if uv_set > 1 {
-            self.notices.add(format!(
-                "material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read",
-                self.material.name
-            ));
+            let left_out = "which is left out: sets 0 and 1 are read";
+            self.note(&format!("a texture on UV set {uv_set}, {left_out}"));
             return Ok(());
         }
         let srgb = matches!(
@@ -306,6 +301,11 @@ impl<'a> Reader<'a> {
             transform: transform.map_or(Affine2::IDENTITY, uv_transform),
         }));
         Ok(())
+    }
+
+    /// Adds a notice of what the material has.
+    fn note(&mut self, what: &str) {
+        self.notices.add(format!("material {} has {what}", self.material.name));
     }
 
     /// A factor clamped to `[0,1]`.
@@ -327,10 +327,7 @@ impl<'a> Reader<'a> {
 
     pub(super) fn within(&mut self, value: f32, least: f32, most: f32) -> f32 {
         if !(least..=most).contains(&value) {
-            self.notices.add(format!(
-                "material {} has factors outside their range, which are clamped",
-                self.material.name
-            ));
+            self.note("factors outside their range, which are clamped");
         }
         value.clamp(least, most)
     }

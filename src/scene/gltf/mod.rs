@@ -40,7 +40,7 @@ mod uri;
 mod variants;
 mod viewpoints;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::PoisonError;
 

@@ -239,13 +239,10 @@ fn places(
 /// What there is at a node.
 fn shows(node: &json::Node) -> u8 {
     let lights = node.extensions.as_ref().and_then(|all| all.khr_lights_punctual.as_ref());
-    let there = [
-        (MESH, node.mesh.is_some()),
-        (CAMERA, node.camera.is_some()),
-        (LIGHT, lights.is_some()),
-        (EXTRAS, node.extras.is_some()),
-    ];
-    there.iter().filter(|(_, is_there)| *is_there).map(|(what, _)| what).sum()
+    MESH * u8::from(node.mesh.is_some())
+        | CAMERA * u8::from(node.camera.is_some())
+        | LIGHT * u8::from(lights.is_some())
+        | EXTRAS * u8::from(node.extras.is_some())
 }
 
 /// `KHR_node_visibility`: whether what is at a node and below it is not to be seen.
