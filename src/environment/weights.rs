@@ -58,18 +58,13 @@ impl<'a> Weights<'a> {
     /// Sum of importance above and below, for the left side of each patch and the right one of the
     /// last.
     fn columns(&self, first_x: u32, y: u32, columns: usize, out: &mut Vec<f64>) {
-        let above = self.pixel_row(y.saturating_sub(1));
-        let below = self.pixel_row(y.min(self.map.height - 1));
-        let at = |x: usize| self.importance(&above[x]) + self.importance(&below[x]);
         let (first, width) = (first_x as usize, self.map.width as usize);
+        let pixels = |y: u32| &self.map.pixels[y as usize * width..][..width];
+        let (above, below) = (pixels(y.saturating_sub(1)), pixels(y.min(self.map.height - 1)));
+        let at = |x: usize| self.importance(&above[x]) + self.importance(&below[x]);
         out.clear();
         out.push(at((first + width - 1) % width));
         out.extend((first..first + columns).map(at));
-    }
-
-    fn pixel_row(&self, y: u32) -> &'a [[f32; 3]] {
-        let width = self.map.width as usize;
-        &self.map.pixels[y as usize * width..][..width]
     }
 
     fn importance(&self, pixel: &[f32; 3]) -> f64 {

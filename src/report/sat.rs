@@ -84,10 +84,7 @@ pub fn measure_all(
         }
         let key = format!("sat-{}_{}", case.title, machine.debug(&(case, scale.to_bits())));
         let kept = store.as_ref().and_then(|store| store.read(&key));
-        let measured = match kept {
-            Some(measured) => measured,
-            None => case.measure(scale)?,
-        };
+        let measured = kept.map_or_else(|| case.measure(scale), Ok)?;
         tell(&measured);
         all.push(measured);
         if let (Some(store), Some(folder)) = (&store, folder) {

@@ -213,13 +213,9 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
         return None;
     }
     values.sort_unstable_by(f64::total_cmp);
-    let tail = expanded_tail(smaller);
+    // The share of resamples to leave out at each end.
+    let count = smaller as f64;
+    let tail = 0.5 * two_sided_p(student_975(smaller - 1) * (count / (count - 1.0)).sqrt());
     let at = |share: f64| values[(share * f64::from(RESAMPLES - 1)).round() as usize];
     Some(Interval { low: at(tail), high: at(1.0 - tail) })
-}
-
-/// Share of resamples to leave out at each end, for groups of `count` runs.
-fn expanded_tail(count: usize) -> f64 {
-    let z = student_975(count - 1) * (count as f64 / (count as f64 - 1.0)).sqrt();
-    0.5 * two_sided_p(z)
 }

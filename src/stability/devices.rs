@@ -9,11 +9,10 @@ use super::maps::sun;
 use super::outcome::Outcome;
 use super::reference::FloorReference;
 use super::scenes::{
-    FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
+    FIRST_TEXTURE, glass, lambert, light, luminances, mean, render, room, sky, view, with_texel,
 };
 use crate::error::{Error, Result};
 use crate::path::WorldBuilder;
-use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
 use crate::scene::{Camera, Material, TextureSlot};
@@ -46,10 +45,6 @@ impl Deviations {
             apart: all.iter().filter(|d| **d > 2e-3).count() as f64 / count,
         }
     }
-}
-
-fn luminances(film: &Film) -> impl Iterator<Item = f64> {
-    film.pixels().iter().map(Pixel::mean_luminance)
 }
 
 /// One sample per pixel, so that errors do not average out, and then many.

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::case::{Entry, On, Setting};
 use super::outcome::Outcome;
 use super::scenes::{
-    Mean, SIGMAS, constant, deviation, difference, lambert, mean, render, room, sealed, sky, view,
+    Mean, SIGMAS, constant, deviation, difference, lambert, luminances, mean, render, room, sealed,
+    sky, view,
 };
 use crate::bvh::{Bvh, Ray, offset_origin};
 use crate::error::Result;
@@ -179,10 +180,7 @@ fn slivers(setting: &Setting) -> Outcome {
 fn degenerate(setting: &Setting) -> Result<Outcome> {
     let wall = lambert(0.7);
     let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
-    let twice: Vec<[Vec3; 3]> = builder.scene.triangles[..4]
-        .iter()
-        .map(|t| t.map(|i| builder.scene.positions[i as usize]))
-        .collect();
+    let twice: Vec<[Vec3; 3]> = (0..4).map(|triangle| builder.scene.corners(triangle)).collect();
     let p = Vec3::new(0.1, 0.2, 0.3);
     let odd = [
         [p, p, p],
@@ -191,24 +189,16 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
         [p, p + Vec3::X, Vec3::splat(f32::NAN)],
         [p, p + Vec3::Y, Vec3::new(f32::INFINITY, 0.0, 0.0)],
     ];
-    let (sound, spoilt) = (
-        builder.build(),
-        room(0.7, 1.0, Vec3::ZERO).0.triangles(&wall, &odd).triangles(&wall, &twice).build(),
-    );
+    let (sound, again) = (builder.build(), room(0.7, 1.0, Vec3::ZERO).0);
+    let spoilt = again.triangles(&wall, &odd).triangles(&wall, &twice).build();
     let environment = sky("day")?;
     let view = view(camera, Sampling::Plain, 4);
     let [a, b] = [&sound, &spoilt].map(|w| render(setting, (w, &environment), view.clone(), 32));
     let (a, b) = (a?, b?);
-    let worst = a
-        .pixels()
-        .iter()
-        .zip(b.pixels())
-        .map(|(a, b)| (a.mean_luminance() - b.mean_luminance()).abs());
-    Ok(Outcome::default().sound(&b).at_most(
-        "pixels' largest change by useless triangles",
-        worst.fold(0.0, f64::max),
-        0.0,
-    ))
+    let changes = luminances(&a).zip(luminances(&b)).map(|(a, b)| (a - b).abs());
+    let worst = changes.fold(0.0, f64::max);
+    let what = "pixels' largest change by useless triangles";
+    Ok(Outcome::default().sound(&b).at_most(what, worst, 0.0))
 }
 
 /// Two coplanar walls: either may be visible, and nothing else.
@@ -226,9 +216,8 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
         let film =
             render(setting, (&world, &constant(1.0)?), view(camera, Sampling::Plain, 4), 64)?;
         // A plane in uniform light shows its albedo.
-        let seen = |p: &crate::render::film::Pixel| p.mean_luminance();
-        let most = film.pixels().iter().map(seen).fold(0.0, f64::max);
-        let least = film.pixels().iter().map(seen).fold(f64::INFINITY, f64::min);
+        let most = luminances(&film).fold(0.0, f64::max);
+        let least = luminances(&film).fold(f64::INFINITY, f64::min);
         outcome = outcome
             .sound(&film)
             .at_most("brightest pixel of albedos up to 0.75", most, 0.75 + 1e-3)

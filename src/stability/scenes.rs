@@ -124,6 +124,11 @@ pub(super) fn render(setting: &Setting, lit: Lit<'_>, view: View, samples: u32) 
     Ok(session.film().clone())
 }
 
+/// Luminances of a film's pixels.
+pub(super) fn luminances(film: &Film) -> impl Iterator<Item = f64> {
+    film.pixels().iter().map(Pixel::mean_luminance)
+}
+
 /// Mean luminance of a picture and its standard error from the samples' own spread.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mean {

@@ -40,17 +40,10 @@ pub(super) struct Wall {
 }
 
 impl Wall {
-    /// Unit direction into the room.
-    fn inward(&self) -> Vec3 {
-        self.along.cross(Vec3::Y)
-    }
-
     /// World from wall frame: x along, y up, z into the room, origin on the inner face.
     pub(super) fn frame(&self) -> Affine3A {
-        Affine3A::from_mat3_translation(
-            Mat3::from_cols(self.along, Vec3::Y, self.inward()),
-            self.origin,
-        )
+        let axes = Mat3::from_cols(self.along, Vec3::Y, self.along.cross(Vec3::Y));
+        Affine3A::from_mat3_translation(axes, self.origin)
     }
 }
 

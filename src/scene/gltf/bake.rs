@@ -116,9 +116,9 @@ fn append_triangles(scene: &mut Scene, part: &Part, first: usize, mirrors: bool)
     part.triangles.len() - (scene.triangles.len() - before)
 }
 
-/// Appends vertex data behind what the earlier vertices have; `pad` for those that have none.
+/// Appends vertex data behind what the earlier vertices have; `pad` for those that have none, if any vertex has some.
 fn extend<T: Copy>(array: &mut Vec<T>, first: usize, values: &[T], pad: T) {
-    if !values.is_empty() {
+    if !array.is_empty() || !values.is_empty() {
         array.resize(first, pad);
         array.extend_from_slice(values);
     }
@@ -126,11 +126,6 @@ fn extend<T: Copy>(array: &mut Vec<T>, first: usize, values: &[T], pad: T) {
 
 /// Makes every array that has anything as long as the positions, and all positions finite.
 pub(super) fn finish(scene: &mut Scene) {
-    fn pad<T: Clone>(array: &mut Vec<T>, length: usize, value: T) {
-        if !array.is_empty() {
-            array.resize(length, value);
-        }
-    }
     // No triangle uses such a position, but bounds are taken over all of them.
     if let Some(&[vertex, ..]) = scene.triangles.first() {
         let inside = scene.positions[vertex as usize];
@@ -138,12 +133,7 @@ pub(super) fn finish(scene: &mut Scene) {
             *position = inside;
         }
     }
-    let length = scene.positions.len();
-    pad(&mut scene.normals, length, Vec3::ZERO);
-    pad(&mut scene.tangents, length, NO_TANGENT);
-    pad(&mut scene.uvs[0], length, Vec2::ZERO);
-    pad(&mut scene.uvs[1], length, Vec2::ZERO);
-    pad(&mut scene.colors, length, Vec4::ONE);
+    append_vertices(scene, &Part::default());
 }
 
 /// Beyond this many metres nothing can be computed in f32: squares of distances would overflow.

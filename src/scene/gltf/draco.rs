@@ -121,10 +121,8 @@ impl Unpacked {
 fn limits(file: &File<'_>, primitive: &json::mesh::Primitive) -> Fallible<DecodeLimits> {
     let accessor = |index| file.document.accessors.get(index);
     let positions = Checked::Valid(json::mesh::Semantic::Positions);
-    let vertices = match primitive.attributes.get(&positions) {
-        Some(positions) => accessor(*positions)?.count.0,
-        None => 0,
-    };
+    let positions = primitive.attributes.get(&positions).copied().map(accessor).transpose()?;
+    let vertices = positions.map_or(0, |positions| positions.count.0);
     let triangles = match primitive.indices.map(accessor).transpose()? {
         Some(indices) if primitive.mode == Checked::Valid(Mode::Triangles) => indices.count.0 / 3,
         // A strip's.

@@ -139,10 +139,8 @@ fn read_in(
     let mut nodes = Nodes::new(document, DAffine3::IDENTITY, &mut notices)?;
     let mut placements = placements(&file, &nodes)?;
     let is_known = frame.is_some();
-    let frame = match frame {
-        Some(frame) => frame,
-        None => Frame::suiting(bounds(&file, &nodes, &placements)?),
-    };
+    let suiting = || bounds(&file, &nodes, &placements).map(Frame::suiting);
+    let frame = frame.map_or_else(suiting, Ok)?;
     if !frame.is_identity() {
         // Again, from where f32 is exact enough; what there was to be said has been said.
         nodes = Nodes::new(document, frame.transform(), &mut Notices::default())?;
