@@ -89,8 +89,9 @@ fn cells() -> Outcome {
             }
         }
     }
+    let odd = "odd points (pole, seam, centre, infinity) off the grid";
     Outcome::default().at_most("cells whose middle lies in another one", lost as f64, 0.0).at_most(
-        "odd points (pole, seam, centre, infinity) off the grid",
+        odd,
         outside as f64,
         0.0,
     )
@@ -134,14 +135,11 @@ fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {
         let mut session = learned(setting, (world, &environment), view)?;
         session.advance(32, &AtomicBool::new(false))?;
         let (film, figures) = (session.film(), session.figures());
+        let learned = figures.learned_cells as f64;
         outcome = outcome
             .sound(film)
             .at_most(format!("{sampling:?}: light in the dark"), mean(film).luminance, 0.0)
-            .at_most(
-                format!("{sampling:?}: distributions of nothing"),
-                figures.learned_cells as f64,
-                0.0,
-            )
+            .at_most(format!("{sampling:?}: distributions of nothing"), learned, 0.0)
             .at_least("cells visited", figures.visited_cells as f64, 1.0);
     }
     Ok(outcome)
@@ -180,15 +178,11 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
     }
     let view = View { learning_paths: 1 << 16, ..view(camera, Sampling::Adaptive, 1) };
     let film = render(setting, (&world, &constant(1.0)?), view, setting.count(4096, 65_536))?;
-    let found = mean(&film);
-    let expected = irradiance / std::f64::consts::PI;
+    let (found, expected) = (mean(&film), irradiance / std::f64::consts::PI);
+    let off = deviation(found, expected, 2e-3);
     Ok(Outcome::default()
         .sound(&film)
-        .at_most(
-            "floor under the slit: standard errors off",
-            deviation(found, expected, 2e-3),
-            SIGMAS,
-        )
+        .at_most("floor under the slit: standard errors off", off, SIGMAS)
         .at_most("noise, relative", found.error / expected, 0.1))
 }
 
@@ -288,15 +282,11 @@ fn learning_paths(setting: &Setting, paths: u64) -> Result<Outcome> {
     session.advance(64, &AtomicBool::new(false))?;
     let plain = View { sampling: Sampling::Plain, seed: 4, ..view };
     let plain = render(setting, (&world, &environment), plain, 256)?;
-    let figures = session.figures();
-    let budget = MEMORY_BUDGET_BYTES as f64;
+    let off = difference(mean(&plain), mean(session.film()));
+    let (figures, budget) = (session.figures(), MEMORY_BUDGET_BYTES as f64);
     Ok(Outcome::default()
         .sound(session.film())
         .at_most("bytes of the grid, at most", figures.grid_peak_bytes as f64, budget)
         .at_least("paths learned from", figures.learning_paths as f64, paths as f64)
-        .at_most(
-            "Adaptive against plain: standard errors off",
-            difference(mean(&plain), mean(session.film())),
-            SIGMAS,
-        ))
+        .at_most("Adaptive against plain: standard errors off", off, SIGMAS))
 }

@@ -88,11 +88,9 @@ fn subnormal(setting: &Setting) -> Result<Outcome> {
         // black is correct there.
         let environment = Environment::new(map, &EnvironmentOptions::default())?;
         let film = floor(setting, &environment, 16)?;
-        return Ok(Outcome::default().sound(&film).at_most(
-            "light from a map of at most 6e-39",
-            mean(&film).luminance,
-            2e-38,
-        ));
+        let light = mean(&film).luminance;
+        let what = "light from a map of at most 6e-39";
+        return Ok(Outcome::default().sound(&film).at_most(what, light, 2e-38));
     }
     check(setting, map)
 }
