@@ -21,12 +21,9 @@ impl TileGrid {
     pub(crate) fn new(width: u32, height: u32, columns: u32, rows: u32) -> Self {
         let column_edges = edges(width, columns);
         let row_edges = edges(height, rows);
-        let mut tiles = Vec::with_capacity((column_edges.len() - 1) * (row_edges.len() - 1));
-        for y in row_edges.windows(2) {
-            tiles.extend(
-                column_edges.windows(2).map(|x| TilePatches { x: x[0]..x[1], y: y[0]..y[1] }),
-            );
-        }
+        let tile = |x: &[u32], y: &[u32]| TilePatches { x: x[0]..x[1], y: y[0]..y[1] };
+        let row = |y| column_edges.windows(2).map(move |x| tile(x, y));
+        let tiles = row_edges.windows(2).flat_map(row).collect();
         Self {
             width,
             columns: column_edges.len() as u32 - 1,

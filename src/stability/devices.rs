@@ -160,12 +160,8 @@ fn glasses() -> (WorldBuilder, Camera) {
         attenuation_distance: 0.5,
         ..glass(1.5, 0.0)
     };
-    let builder = builder.sphere(&smoked, Vec3::new(0.2, 0.5, 0.3), 0.4).sphere(
-        &glass(1.5, 0.3),
-        Vec3::new(-0.3, 0.4, 0.9),
-        0.3,
-    );
-    (builder, camera)
+    let builder = builder.sphere(&smoked, Vec3::new(0.2, 0.5, 0.3), 0.4);
+    (builder.sphere(&glass(1.5, 0.3), Vec3::new(-0.3, 0.4, 0.9), 0.3), camera)
 }
 
 /// A floor with a normal map beside the room's block.

@@ -36,6 +36,12 @@ fn growing(at: Vec3, direction: Vec3) -> Affine3A {
     Affine3A::from_rotation_translation(rotation, at)
 }
 
+/// The horizontal direction at an angle from +X towards +Z.
+fn outward(angle: f32) -> Vec3 {
+    let (sin, cos) = angle.sin_cos();
+    Vec3::new(cos, 0.0, sin)
+}
+
 /// A flower pot with soil; returns the height of the soil.
 pub(super) fn pot(b: &mut Builder, clay: Mat, soil: Mat, radius: f32, height: f32) -> f32 {
     let (r, h) = (radius, height);
@@ -61,9 +67,7 @@ pub(super) fn pot(b: &mut Builder, clay: Mat, soil: Mat, radius: f32, height: f3
 pub(super) fn blades(b: &mut Builder, mat: Mat, count: u32, height: f32, seed: u32) {
     let mut stream = Stream::new(seed);
     for i in 0..count {
-        let angle = i as f32 * 2.4 + stream.between(-0.3, 0.3);
-        let (s, c) = angle.sin_cos();
-        let out = Vec3::new(c, 0.0, s);
+        let out = outward(i as f32 * 2.4 + stream.between(-0.3, 0.3));
         let lean = stream.between(0.05, 0.32);
         let h = height * stream.between(0.6, 1.0);
         let tone = GREENS[stream.index(GREENS.len())];
@@ -79,9 +83,7 @@ pub(super) fn blades(b: &mut Builder, mat: Mat, count: u32, height: f32, seed: u
 pub(super) fn big_leaves(b: &mut Builder, mat: Mat, count: u32, height: f32, seed: u32) {
     let mut stream = Stream::new(seed);
     for i in 0..count {
-        let angle = i as f32 * 2.4 + stream.between(-0.4, 0.4);
-        let (s, c) = angle.sin_cos();
-        let out = Vec3::new(c, 0.0, s);
+        let out = outward(i as f32 * 2.4 + stream.between(-0.4, 0.4));
         let t = (i as f32 + 0.5) / count as f32;
         let top = height * (1.0 - 0.62 * t) * stream.between(0.9, 1.05);
         let reach = height * (0.10 + 0.30 * t) * stream.between(0.8, 1.2);
@@ -110,8 +112,7 @@ pub(super) fn big_leaves(b: &mut Builder, mat: Mat, count: u32, height: f32, see
 pub(super) fn trailing(b: &mut Builder, mat: Mat, radius: f32, length: f32, seed: u32) {
     let mut stream = Stream::new(seed);
     for i in 0..12 {
-        let (s, c) = (i as f32 * TAU / 12.0 + stream.between(-0.2, 0.2)).sin_cos();
-        let out = Vec3::new(c, 0.0, s);
+        let out = outward(i as f32 * TAU / 12.0 + stream.between(-0.2, 0.2));
         let drop = length * stream.between(0.35, 1.0);
         let reach = radius * stream.between(1.15, 1.5);
         let at = |f: f32| {
@@ -139,8 +140,7 @@ pub(super) fn trailing(b: &mut Builder, mat: Mat, radius: f32, length: f32, seed
 pub(super) fn twigs(b: &mut Builder, bark: Mat, mat: Mat, height: f32, seed: u32) {
     let mut stream = Stream::new(seed);
     for i in 0..6 {
-        let (s, c) = (i as f32 * TAU / 6.0 + stream.between(-0.4, 0.4)).sin_cos();
-        let out = Vec3::new(c, 0.0, s);
+        let out = outward(i as f32 * TAU / 6.0 + stream.between(-0.4, 0.4));
         let h = height * stream.between(0.75, 1.0);
         let lean = stream.between(0.15, 0.45);
         let at = |f: f32| out * (0.01 + lean * h * f * f) + Vec3::Y * (0.02 + h * f);
