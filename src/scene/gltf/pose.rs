@@ -96,9 +96,9 @@ impl Nodes {
         } else {
             // The default scene, else the first one.
             let shown = document.scene.unwrap_or(Index::new(0));
-            if scenes.len() > 1 {
-                notices
-                    .add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
+            let count = scenes.len();
+            if count > 1 {
+                notices.add(format!("the file has {count} scenes; scene {shown} is shown"));
             }
             let scene: Tops = scenes.get_as(shown)?;
             for &node in &scene.nodes {

@@ -18,9 +18,10 @@ use super::limits::{Fallible, check_count};
 use super::part::Part;
 use super::placement::Placement;
 use super::primitive::Mesh;
+use crate::bvh;
 use crate::math::box_corners;
+use crate::memory;
 use crate::scene::{Instance, Instances, MAX_SHOWN, Placing, Scene};
-use crate::{bvh, memory};
 
 /// Meshes are shared if that spares so many triangles, 0.3 GB of them, and half of all.
 const MIN_SPARED: u64 = 1 << 20;
