@@ -16,7 +16,7 @@ use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::render::gpu::{Gpu, UploadedScene};
-use crate::render::{Driver, Phase, Sampling, StopRule, View};
+use crate::render::{Driver, Phase, Sampling, Session, StopRule, View};
 use crate::report::{Machine, OpenDevice};
 
 pub use figures::{Bench, DeviceFigures, Parity, PathFigures, SceneFigures};
@@ -96,7 +96,7 @@ impl Place<'_> {
     }
 
     fn fill(&self, figures: &mut SceneFigures) -> Result<Compared> {
-        let Subject { world, environment, .. } = self.subject;
+        let (world, environment) = self.lit();
         let start = Instant::now();
         let upload = |gpu| UploadedScene::new(gpu, world, environment);
         let uploaded = self.open.gpu.as_ref().map(upload).transpose()?;
@@ -105,7 +105,7 @@ impl Place<'_> {
         let (rays, hits) = rays::measure(self, uploaded.as_ref())?;
         figures.rays = rays;
         let view = View { sampling: Sampling::Plain, ..self.view(COMPARED.0) };
-        let mut session = self.session(uploaded.as_ref(), view)?;
+        let mut session = Session::on(self.lit(), view, uploaded.as_ref())?;
         session.advance(COMPARED.1, self.cancel)?;
         session.settle()?;
         Ok(Compared { picture: session.film().image(), hits })
@@ -123,7 +123,7 @@ impl Place<'_> {
             let mut view = self.view(TURNING);
             let turn = Affine3A::from_rotation_y(0.02 * f32::from(round));
             view.camera.world_from_camera *= turn;
-            let mut session = self.session(uploaded, view)?;
+            let mut session = Session::on(self.lit(), view, uploaded)?;
             session.finish_learning();
             if let Some(distributions) = distributions {
                 session.set_grid(distributions.clone())?;
@@ -148,7 +148,7 @@ impl Place<'_> {
     fn paths(&self, uploaded: Option<&UploadedScene>, upload_seconds: f64) -> Result<PathFigures> {
         let start = Instant::now();
         let seconds = || start.elapsed().as_secs_f64();
-        let session = self.session(uploaded, self.view(self.options.size))?;
+        let session = Session::on(self.lit(), self.view(self.options.size), uploaded)?;
         let mut driver = Driver::new(session, StopRule::default());
         let mut first_distributions = None;
         while driver.session.samples() == 0 {

@@ -3,10 +3,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::environment::Environment;
-use crate::error::Result;
-use crate::path::{World, framing};
-use crate::render::gpu::{RayChoice, Schedule, UploadedScene};
-use crate::render::{Session, Sharing, View};
+use crate::path::{Lit, World, framing};
+use crate::render::gpu::{RayChoice, Schedule};
+use crate::render::{Sharing, View};
 use crate::report::{Device, OpenDevice};
 
 /// Options of a bench.
@@ -51,13 +50,8 @@ impl Place<'_> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    pub(super) fn session(
-        &self,
-        uploaded: Option<&UploadedScene>,
-        view: View,
-    ) -> Result<Session<'_>> {
-        let Subject { world, environment, .. } = self.subject;
-        Session::on((world, environment), view, uploaded)
+    pub(super) fn lit(&self) -> Lit<'_> {
+        (&self.subject.world, &self.subject.environment)
     }
 
     /// A view with the defaults of `lightgrid render`.

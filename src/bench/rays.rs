@@ -71,7 +71,7 @@ pub(super) fn measure(
     let world = &place.subject.world;
     // Kernels without environment sampling.
     let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
-    let lit = (world, &place.subject.environment);
+    let lit = place.lit();
     let mut caster = uploaded.map(|uploaded| Caster::new(uploaded, lit, &view)).transpose()?;
     let mut figures = Vec::new();
     let mut hits = Vec::new();

@@ -316,25 +316,19 @@ impl Reading<'_> {
             bytes += part.bytes();
             parts.push(part);
         }
-        self.open_sheets(&mut parts, place)?;
-        Ok(parts)
-    }
-
-    /// Gives bodies that are not closed the materials of sheets, as thick as the first instance is placed.
-    fn open_sheets(&mut self, parts: &mut [Part], place: Option<&DAffine3>) -> Fallible<()> {
+        // Bodies that are not closed get the materials of sheets, as thick as the first instance is placed.
         let material = |part: &Part| &self.materials.materials[part.material as usize];
-        if !parts.iter().any(|part| material(part).has_inside()) {
-            return Ok(());
-        }
-        let scale = place.map_or(1.0, |place| place.matrix3.determinant().abs().cbrt()) as f32;
-        let are_sheets = sheets::sheets(parts)?;
-        for (part, is_sheet) in parts.iter_mut().zip(are_sheets) {
-            let material = &self.materials.materials[part.material as usize];
-            if is_sheet && material.has_inside() {
-                part.material = self.materials.sheet(part.material, scale * material.thickness);
+        if parts.iter().any(|part| material(part).has_inside()) {
+            let scale = place.map_or(1.0, |place| place.matrix3.determinant().abs().cbrt()) as f32;
+            let are_sheets = sheets::sheets(&parts)?;
+            for (part, is_sheet) in parts.iter_mut().zip(are_sheets) {
+                let material = &self.materials.materials[part.material as usize];
+                if is_sheet && material.has_inside() {
+                    part.material = self.materials.sheet(part.material, scale * material.thickness);
+                }
             }
         }
-        Ok(())
+        Ok(parts)
     }
 }
 
