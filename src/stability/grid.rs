@@ -89,12 +89,9 @@ fn cells() -> Outcome {
             }
         }
     }
-    let odd = "odd points (pole, seam, centre, infinity) off the grid";
-    Outcome::default().at_most("cells whose middle lies in another one", lost as f64, 0.0).at_most(
-        odd,
-        outside as f64,
-        0.0,
-    )
+    let what = "cells whose middle lies in another one";
+    let outcome = Outcome::default().at_most(what, lost as f64, 0.0);
+    outcome.at_most("odd points (pole, seam, centre, infinity) off the grid", outside as f64, 0.0)
 }
 
 /// Pictures by [`Sampling::Adaptive`] and [`Sampling::Talk`] against the plain sampler's.
