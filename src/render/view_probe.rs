@@ -78,6 +78,8 @@ fn cut_off(lit: Lit<'_>, view: &View) -> CutOff {
     CutOff { by_bounces: mean(|cut| cut.by_bounces), by_interfaces: mean(|cut| cut.by_interfaces) }
 }
 
+/// Parts of the picture along each axis whose share of light from translucent surfaces is found.
+const PARTS: u32 = 4;
 /// Least share of the light that must come from translucent surfaces to be aimed at.
 const MIN_TRANSLUCENT: f32 = 0.1;
 /// Probability of aiming at them over that share: the rest of the light is found by the other paths alone.
@@ -99,7 +101,19 @@ pub(super) fn lights_of(
     let tracer = PathTracer { lights, limits, layers: false, ..view.tracer(lit, grid) };
     let Some(translucent) = tracer.translucent_surfaces() else { return chosen };
     let mut aiming = LocalLights { translucent: Some(Box::new(translucent)), ..lights.clone() };
-    let tracer = PathTracer { lights: &aiming, ..tracer };
+    let share = share_of_translucent(&PathTracer { lights: &aiming, ..tracer }, view);
+    if share < MIN_TRANSLUCENT {
+        return chosen;
+    }
+    if let Some(translucent) = &mut aiming.translucent {
+        translucent.aim_probability = AIM_OF_SHARE * share;
+    }
+    Some(aiming)
+}
+
+/// Share of the picture's light that comes straight from translucent surfaces, the mean over parts of it: what a lamp
+/// shines on near by may be brighter than all the rest.
+fn share_of_translucent(tracer: &PathTracer<'_>, view: &View) -> f32 {
     let size @ [width, height] = view.whole_size();
     let rays = CameraRays::new(&view.camera, width, height);
     let places: Vec<Vec2> = places(size).collect();
@@ -108,15 +122,15 @@ pub(super) fn lights_of(
         tracer.light_of_translucent(rays.ray(places[index], Vec2::ZERO), sampler)
     };
     let of_paths: Vec<[f32; 2]> = (0..places.len()).into_par_iter().map(of_path).collect();
-    let [from_them, all] = [0, 1].map(|i| of_paths.iter().map(|light| light[i]).sum::<f32>());
-    let share = from_them / all;
-    if share.is_nan() || share < MIN_TRANSLUCENT {
-        return chosen;
+    let mut parts = [[0.0; 2]; (PARTS * PARTS) as usize];
+    for (index, light) in (0..).zip(of_paths) {
+        let part = [index % LOOKS, index / LOOKS].map(|place| place * PARTS / LOOKS);
+        let sums = &mut parts[(part[1] * PARTS + part[0]) as usize];
+        *sums = [sums[0] + light[0], sums[1] + light[1]];
     }
-    if let Some(translucent) = &mut aiming.translucent {
-        translucent.aim_probability = AIM_OF_SHARE * share;
-    }
-    Some(aiming)
+    let lit = parts.iter().filter(|[_, all]| *all > 0.0 && all.is_finite());
+    let shares: Vec<f32> = lit.map(|[some, all]| some / all).collect();
+    shares.iter().sum::<f32>() / f32::max(shares.len() as f32, 1.0)
 }
 
 /// A sentence where paths end with much of their light left, unless direct light alone is asked for.
