@@ -239,10 +239,11 @@ fn places(
 /// What there is at a node.
 fn shows(node: &json::Node) -> u8 {
     let lights = node.extensions.as_ref().and_then(|all| all.khr_lights_punctual.as_ref());
-    MESH * u8::from(node.mesh.is_some())
-        | CAMERA * u8::from(node.camera.is_some())
-        | LIGHT * u8::from(lights.is_some())
-        | EXTRAS * u8::from(node.extras.is_some())
+    let bit = |kind: u8, is_there: bool| if is_there { kind } else { 0 };
+    bit(MESH, node.mesh.is_some())
+        | bit(CAMERA, node.camera.is_some())
+        | bit(LIGHT, lights.is_some())
+        | bit(EXTRAS, node.extras.is_some())
 }
 
 /// `KHR_node_visibility`: whether what is at a node and below it is not to be seen.
