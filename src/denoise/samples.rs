@@ -101,19 +101,21 @@ impl<'a> Samples<'a> {
         // Both tell of the spread of one of the film's own samples, and so does how far apart they are: of
         // something bright one may have met nothing.
         let apart = luminance(vec3(own) - vec3(other)).powi(2);
-        let (mut squares, mut freedom) = (0.0, 0.0);
+        let (mut squares, mut freedom, mut weighted) = (0.0, 0.0, 0.0);
         for (pixel, worth) in [(own, 1.0), (other, worth)] {
             if pixel.samples() > 1 {
                 let (count, others) = (pixel.samples() as f32, (pixel.samples() - 1) as f32);
                 squares += worth * variance(pixel) * others * count;
                 freedom += others;
+                weighted += (worth * count / total).powi(2) * variance(pixel);
             }
         }
         if freedom > 0.0 && n > 0.0 && m > 0.0 && worth > 0.0 {
             squares += apart / (1.0 / n + 1.0 / (worth * m));
             freedom += 1.0;
         }
-        let variance = (freedom > 0.0).then(|| squares / freedom / total);
+        // A film that counts less for an error of its own has less spread than that.
+        let variance = (freedom > 0.0).then(|| (squares / freedom / total).max(weighted));
         Mean { rgb, variance }
     }
 }
@@ -141,6 +143,8 @@ mod tests {
         let variance = |worth| mean(worth).variance.expect("known");
         assert!((variance(1.0) - (2.0 + 2.0 + 9.0 / 0.75) / 5.0 / 6.0).abs() < 1e-6);
         assert!((variance(4.0) - (2.0 + 8.0 + 9.0 / 0.5625) / 5.0 / 18.0).abs() < 1e-6);
+        // What counts little leaves the spread of the rest.
+        assert!((variance(0.01) - (2.0 / 2.04_f32).powi(2)).abs() < 1e-3);
         let single = film(&[2.0]);
         assert_eq!(Samples::of(&single, None).mean(0).variance, None);
         let four = film(&[4.0]);
