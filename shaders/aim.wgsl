@@ -39,7 +39,10 @@ fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits:
         let light = descend_lights(globals.translucent_root, receiver, &draw);
         let triangle = lights(globals.translucent_at + light).x;
         let barycentric = barycentric_of(vec2f(draw_remainder(draw), u.y));
-        let direction = normalize(place_on(light_corners(triangle), barycentric) - receiver.position);
+        let target_ = place_on(light_corners(triangle), barycentric);
+        // From where the ray begins, or it would miss small triangles.
+        let origin = origin_toward(vertex.point, target_ - receiver.position);
+        let direction = normalize(target_ - origin);
         (*path).aim = triangle + 2u;
         let f = scattered(path, vertex, direction);
         if max_element(f.value) > 0.0 {

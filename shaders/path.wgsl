@@ -529,6 +529,9 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if AREA_SOURCES
         (*path).departure_receiver = receiver_of(vertex);
 //#end
+//#if AIMING
+        (*path).aim = NO_AIM;
+//#end
 //#if SHARING
         (*path).departure_map_samples = (*path).map_samples;
         (*path).map_samples = 1.0;

@@ -105,14 +105,12 @@ impl PathTracer<'_> {
         let (mut of_first, mut of_second) = (None, None);
         let Some(first) = path.next_vertex(&mut of_first) else { return [0.0; 2] };
         path.radiance = Vec3::ZERO;
-        if self.translucent_for(&first).is_none() {
-            return [0.0; 2];
-        }
+        let Some(translucent) = self.translucent_for(&first) else { return [0.0; 2] };
         let mut from_translucent = 0.0;
         if path.visit(&first) {
             let before = path.radiance;
             let second = path.next_vertex(&mut of_second);
-            let is_translucent = second.as_ref().is_some_and(Vertex::transmits);
+            let is_translucent = second.as_ref().is_some_and(|vertex| translucent.has(vertex));
             if let Some(second) = second
                 && path.visit(&second)
             {

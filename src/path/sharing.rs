@@ -6,7 +6,7 @@
 //! *Accelerating Path Tracing by Re-Using Paths*, EGRW 2002).
 //!
 //! A second vertex y is drawn by pixel k with the density `q_k p_k(y) V_k(y)`: the probability that the
-//! pixel keeps its own, the density per area of its BSDF, and whether nothing is in the way; in fog, with
+//! pixel keeps its own, the density per area of its BSDF (and of aiming), and whether nothing is in the way; in fog, with
 //! the density of flying so far, per volume if y lies in the fog ([`Crossing`]). All pixels
 //! are weighted by the sum of that over the tile, so each gets the integral it would get alone. That
 //! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for

@@ -14,12 +14,13 @@ use glam::Vec3;
 
 use super::light_tree::{Light, LightTree, Moments, Receiver};
 use super::triangles::{facing, point_on, relate, solid_angle_pdf};
-use super::vertex::{Aim, Onward, SurfaceScatterer, Vertex};
+use super::vertex::{Aim, Onward, Scatterer, SurfaceScatterer, Vertex};
 use crate::sampler::unit_from_bits;
 use crate::scene::{Material, Scene};
 
 /// Most triangles that paths aim at: the tree is made for each picture.
 const MAX_TRIANGLES: usize = 1 << 15;
+
 /// Translucent triangles, and how paths choose among them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TranslucentSurfaces {
@@ -56,7 +57,8 @@ impl TranslucentSurfaces {
             let area = 0.5 * (b - a).cross(c - a);
             (area.length() > 0.0).then_some(Facet { triangle, area })
         };
-        let facets: Vec<Facet> = scene.own_triangles().filter_map(facet).collect();
+        let facets = scene.own_triangles().filter_map(facet).take(MAX_TRIANGLES + 1);
+        let facets: Vec<Facet> = facets.collect();
         if facets.len() > MAX_TRIANGLES { Vec::new() } else { facets }
     }
 
@@ -76,12 +78,20 @@ impl TranslucentSurfaces {
         Self { triangles, tree, aim_probability: 0.5 }
     }
 
-    /// Chooses a point as seen from a place: its triangle and the unit direction to it.
+    /// Chooses a point as seen from a place: its triangle and itself.
     fn sample(&self, scene: &Scene, receiver: &Receiver, bits: [u32; 2]) -> (u32, Vec3) {
         let choice = self.tree.sample(receiver, bits[0]);
         let triangle = self.triangles[choice.light as usize];
         let (target, _) = point_on(&scene.corners(triangle), choice.remainder, bits[1]);
-        (triangle, (target - receiver.position).normalize())
+        (triangle, target)
+    }
+
+    /// Whether a vertex lies on one of them.
+    pub(super) fn has(&self, vertex: &Vertex<'_>) -> bool {
+        matches!(
+            &vertex.scatterer,
+            Scatterer::Surface(surface) if self.triangles.binary_search(&surface.triangle).is_ok()
+        )
     }
 
     /// Density in solid angle with which a path arrives at a place of `triangle`, `distance` metres away along unit
@@ -119,7 +129,10 @@ impl TranslucentSurfaces {
             let onward = surface.onward(Vec3::new(lobe, x, y))?;
             return Some(Onward { weight: onward.weight * weight, aim: Aim::Free, ..onward });
         }
-        let (triangle, direction) = self.sample(scene, &vertex.receiver(), bits);
+        let (triangle, target) = self.sample(scene, &vertex.receiver(), bits);
+        // From where the ray begins, or it would miss small triangles.
+        let origin = surface.sides.origin_toward(vertex.position, target - vertex.position);
+        let direction = (target - origin).normalize();
         let (f, pdf_solid_angle) = vertex.scatterer.scattered(direction)?;
         let weight = f * (weight / pdf_solid_angle);
         let aim = Aim::At(triangle);

@@ -20,11 +20,6 @@ pub(super) struct Vertex<'v> {
 }
 
 impl Vertex<'_> {
-    /// Whether light comes through a surface there.
-    pub(super) fn transmits(&self) -> bool {
-        matches!(&self.scatterer, Scatterer::Surface(surface) if surface.transmits)
-    }
-
     /// What lights are chosen for. What lets light through is lit from behind as well.
     pub(super) fn receiver(&self) -> Receiver {
         let normal = match &self.scatterer {

@@ -50,8 +50,11 @@ impl<'a> Session<'a> {
         view.sharing = view.sharing.decided(world, &view);
         let tiles = Tiles::new((world, environment), &view);
         let training = CacheTraining::new((world, environment), &view);
+        let start = Instant::now();
+        let lights = view_probe::lights_of((world, environment), &view, tiles.grid());
+        let learning_seconds = start.elapsed().as_secs_f64();
         let state = SessionState {
-            lights: view_probe::lights_of((world, environment), &view, tiles.grid()),
+            lights,
             view,
             film: HostFilm::new(),
             samples: 0,
@@ -60,7 +63,7 @@ impl<'a> Session<'a> {
             tiles,
             sequence: Sequence::default(),
             training,
-            figures: Figures::default(),
+            figures: Figures { learning_seconds, ..Figures::default() },
             here: Spent::default(),
         };
         Self { world, environment, gpu: None, state }
