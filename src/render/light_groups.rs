@@ -165,7 +165,7 @@ pub(crate) fn mixed(films: &[(&Film, f32)]) -> Film {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
@@ -195,17 +195,23 @@ mod tests {
         (World::new(scene), Environment::new(map, &EnvironmentOptions::default()).expect("sound"))
     }
 
-    fn rendered(lit: Lit<'_>, view: View, gpu: Option<&Gpu>) -> Film {
+    /// At least so many samples of each pixel.
+    pub(in crate::render) fn rendered(
+        lit: Lit<'_>,
+        view: View,
+        samples: u32,
+        gpu: Option<&Gpu>,
+    ) -> Film {
         let uploaded = gpu.map(|gpu| UploadedScene::new(gpu, lit.0, lit.1).expect("uploaded"));
         let mut session = Session::on(lit, view, uploaded.as_ref()).expect("begun");
-        while session.phase() == Phase::Learning || session.samples() < 64 {
+        while session.phase() == Phase::Learning || session.samples() < samples {
             session.advance(16, &AtomicBool::new(false)).expect("rendered");
         }
         session.film().clone()
     }
 
     /// Mean luminance and its variance.
-    fn mean(film: &Film) -> [f64; 2] {
+    pub(in crate::render) fn mean(film: &Film) -> [f64; 2] {
         let count = film.pixels().len() as f64;
         let sum = |of: &dyn Fn(&Pixel) -> f64| film.pixels().iter().map(of).sum::<f64>();
         [sum(&Pixel::mean_luminance) / count, sum(&Pixel::variance_of_mean) / (count * count)]
@@ -230,7 +236,7 @@ mod tests {
         assert_eq!(names, all);
         let all = |gpu: Option<&Gpu>| -> Vec<Film> {
             let of_group = |(number, group): (u32, &LightGroup)| {
-                rendered((&world, &group.environment), group.view(&view, number), gpu)
+                rendered((&world, &group.environment), group.view(&view, number), 64, gpu)
             };
             (0..).zip(&groups).map(of_group).collect()
         };
@@ -238,7 +244,7 @@ mod tests {
         for (film, name) in films.iter().zip(&names) {
             assert!(mean(film)[0] > 0.0, "{name} shines");
         }
-        let picture = rendered((&world, &environment), View { seed: 1, ..view.clone() }, None);
+        let picture = rendered((&world, &environment), View { seed: 1, ..view.clone() }, 64, None);
         let sum = mixed(&films.iter().map(|film| (film, 1.0)).collect::<Vec<_>>());
         assert_agree(&sum, &picture, "the sum");
         assert_eq!(sum.surface_of(700), films[0].surface_of(700), "layers are the first's");
@@ -259,7 +265,7 @@ mod tests {
         lit.set_intensity(factors.intensity);
         let view_of_mix = View { local_lights: factors.local_lights(&world), ..view.clone() };
         let seed = 2;
-        let picture = rendered((&world, &lit), View { seed, ..view_of_mix }, None);
+        let picture = rendered((&world, &lit), View { seed, ..view_of_mix }, 64, None);
         assert_agree(&mixed(&weighted), &picture, "the mix");
         #[cfg(feature = "gpu")]
         if let Some(gpu) = Gpu::for_test() {

@@ -168,18 +168,17 @@ fn places([width, height]: [u32; 2]) -> impl Iterator<Item = Vec2> {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use glam::Vec3;
 
     use super::*;
     use crate::environment::{Environment, EnvironmentOptions, sky};
     use crate::image::Image;
     use crate::path::{PathLimits, WorldBuilder};
+    use crate::render::Sharing;
     use crate::render::film::{Film, Pixel};
     use crate::render::filter::PixelFilter;
-    use crate::render::gpu::{Gpu, UploadedScene};
-    use crate::render::{Phase, Session, Sharing};
+    use crate::render::gpu::Gpu;
+    use crate::render::light_groups::tests::{mean, rendered};
     use crate::scene::{Camera, Material};
 
     /// Cloth, and glass that spreads what it lets through.
@@ -222,22 +221,6 @@ pub(super) mod tests {
             ..View::new(camera, [32, 24])
         };
         (world, environment, view)
-    }
-
-    fn rendered(lit: Lit<'_>, view: View, samples: u32, gpu: Option<&Gpu>) -> Film {
-        let uploaded = gpu.map(|gpu| UploadedScene::new(gpu, lit.0, lit.1).expect("uploaded"));
-        let mut session = Session::on(lit, view, uploaded.as_ref()).expect("begun");
-        while session.phase() == Phase::Learning || session.samples() < samples {
-            session.advance(samples, &AtomicBool::new(false)).expect("rendered");
-        }
-        session.film().clone()
-    }
-
-    /// Mean luminance and its variance.
-    fn mean(film: &Film) -> [f64; 2] {
-        let count = film.pixels().len() as f64;
-        let sum = |of: &dyn Fn(&Pixel) -> f64| film.pixels().iter().map(of).sum::<f64>();
-        [sum(&Pixel::mean_luminance) / count, sum(&Pixel::variance_of_mean) / (count * count)]
     }
 
     #[test]
