@@ -1,6 +1,6 @@
-// Paths that aim at translucent surfaces: twin of src/path/translucent.rs and src/path/aim.rs. From word `globals.translucent_at` on `lights`
-// holds the triangles (ascending) and the node of each in `light_nodes`, where their tree begins at node
-// `globals.translucent_root`.
+// Paths that aim at translucent surfaces: twin of src/path/translucent.rs and src/path/aim.rs. From word
+// `globals.translucent_at` on, `lights` holds the triangles (ascending) and the node of each in `light_nodes`, where
+// their tree begins at node `globals.translucent_root`.
 
 // What `Path::aim` is where the ray may not have been aimed, and where it may have been, but was not. Otherwise it is
 // the triangle and 2.
@@ -24,16 +24,11 @@ fn may_aim(path: ptr<function, Path>, vertex: Vertex) -> bool {
 // Where the path goes on, by a number for the lobe, one that decides whether it aims, and two more: twin of
 // `TranslucentSurfaces::onward`.
 fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits: vec2u) -> BsdfSample {
-    (*path).aim = NO_AIM;
     let u = vec2f(unit_from_bits(bits.x), unit_from_bits(bits.y));
-    if !may_aim(path, vertex) {
-        return bsdf_sample(vertex.bsdf, vertex.wo, vec3f(choice.x, u));
-    }
+    let may_aim_ = may_aim(path, vertex);
+    (*path).aim = select(NO_AIM, FREE_AIM, may_aim_);
     var sample: BsdfSample;
-    if choice.y >= globals.aim_probability {
-        (*path).aim = FREE_AIM;
-        sample = bsdf_sample(vertex.bsdf, vertex.wo, vec3f(choice.x, u));
-    } else {
+    if may_aim_ && choice.y < globals.aim_probability {
         let receiver = receiver_of(vertex);
         var draw = draw_new(bits.x);
         let light = descend_lights(globals.translucent_root, receiver, &draw);
@@ -50,8 +45,10 @@ fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits:
             sample.weight = f.value / f.pdf_solid_angle;
             sample.pdf_solid_angle = f.pdf_solid_angle;
         }
+    } else {
+        sample = bsdf_sample(vertex.bsdf, vertex.wo, vec3f(choice.x, u));
     }
-    sample.weight /= 1.0 - globals.aim_probability;
+    sample.weight /= select(1.0, 1.0 - globals.aim_probability, may_aim_);
     return sample;
 }
 

@@ -112,8 +112,8 @@ fn begin_estimate(group: u32, lane: u32) {
         survival_ = survival(&path);
     }
 //#if AIMING
-    let may_aim_ = select(1.0, 1.0 - globals.aim_probability, path.aim != NO_AIM);
-    let density = path.departure_pdf_solid_angle * may_aim_;
+    let by_bsdf = select(1.0, 1.0 - globals.aim_probability, path.aim != NO_AIM);
+    let density = path.departure_pdf_solid_angle * by_bsdf;
 //#else
     let density = path.departure_pdf_solid_angle;
 //#end

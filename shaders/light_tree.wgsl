@@ -90,7 +90,7 @@ fn descend_lights(root: u32, receiver: Receiver, draw: ptr<function, Draw>) -> u
 }
 
 //#if AREA_SOURCES
-// What is left of an interval where the tree with this root leads to a leaf.
+// The part of an interval of random numbers with which the tree with this root chooses a leaf.
 fn choose_leaf(root: u32, leaf: u32, before: Interval, receiver: Receiver) -> Interval {
     var chosen = before;
     var node = root;
