@@ -12,7 +12,7 @@ pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
     (16 << 20) + file_bytes.saturating_mul(1100)
 }
 
-/// Limits of a decoder to so many pixels a side and bytes, and to what a file of `file_bytes` may take.
+/// Limits of a decoder: pixels a side, bytes, and what a file of `file_bytes` may take.
 pub(super) fn limits(side: u32, bytes: u64, file_bytes: u64) -> image::Limits {
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(side), Some(side));

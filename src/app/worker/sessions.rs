@@ -237,7 +237,7 @@ impl<'a> Sessions<'a> {
         }
     }
 
-    /// What there is to say of a picture of so many samples where paths end with much of their light left.
+    /// A notice where paths end with much of their light left; `None` of a picture that moves or has no samples.
     pub(super) fn cut_off(&self, samples: u32) -> Option<Arc<str>> {
         let request = &self.watch.request;
         if request.moving || samples == 0 {

@@ -84,7 +84,7 @@ impl Moments {
 }
 
 impl Node {
-    /// The same where so many nodes of another tree are before those of its own.
+    /// This node in an array where its tree's nodes begin at number `by`.
     #[cfg(feature = "gpu")]
     pub(crate) fn moved(&self, by: u32) -> Self {
         let link = if self.link & LEAF == 0 { self.link + by } else { self.link };
