@@ -148,7 +148,7 @@ fn write_small(folder: Option<&Path>, name: &str, small: &Rgb8) {
     let Some(folder) = folder else { return };
     // Without it the list has no picture, and no more is lost.
     let _ = std::fs::create_dir_all(folder);
-    let _ = write_png(&file_of(folder, name), small, &[]);
+    let _ = write_png(&file_of(folder, name), small, None, &[]);
 }
 
 fn in_small(map: &Image) -> Rgb8 {
@@ -204,7 +204,7 @@ mod tests {
         assert_eq!((small.width, small.height), (WIDTH, WIDTH / 2));
         let name = "/maps/day.exr";
         assert_eq!(read_small(folder.path(), name), None);
-        write_png(&file_of(folder.path(), name), &small, &[]).expect("written");
+        write_png(&file_of(folder.path(), name), &small, None, &[]).expect("written");
         assert_eq!(read_small(folder.path(), name), Some(small.clone()));
         assert_eq!(read_small(folder.path(), "/maps/night.exr"), None);
         std::fs::write(file_of(folder.path(), name), "no picture").expect("written");

@@ -201,7 +201,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.inspect.is_some() {
         studio.measure_truth()?;
     }
-    write_png(path, &studio.take()?, &[])?;
+    write_png(path, &studio.take()?, None, &[])?;
     say_written(path);
     Ok(())
 }

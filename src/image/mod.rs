@@ -32,7 +32,7 @@ pub(crate) use map::{IS_A_FILM, is_film, looks_like_film, looks_like_picture, lo
 pub use map::{LoadedMap, read_map, read_picture, read_with_linearity, sanitise};
 pub use picture::{Image, Rgb8};
 use picture::{MAX_PIXELS, MAX_SIDE, check_size};
-pub use png::{encode_png, write_png, write_png_with_alpha};
+pub use png::{encode_png, write_png};
 pub use texels::Texels;
 
 pub mod ldr;

@@ -6,25 +6,18 @@ use std::path::Path;
 use super::{Rgb8, write_beside_and_rename};
 use crate::error::{Error, Result};
 
-/// Writes an 8-bit sRGB PNG (by [`write_beside_and_rename`]) with the metadata as text chunks.
+/// Writes an 8-bit sRGB PNG (by [`write_beside_and_rename`]) with the metadata as text chunks. An alpha channel has as
+/// many values as there are pixels; colours are not multiplied by it.
 ///
 /// # Errors
 /// If a metadata name is not 1 to 79 Latin-1 characters, or the file cannot be written.
-pub fn write_png(path: &Path, picture: &Rgb8, metadata: &[(String, String)]) -> Result<()> {
-    write_beside_and_rename(path, |file| encode(file, picture, None, metadata))
-}
-
-/// The same with an alpha channel, of as many values as there are pixels; colours are not multiplied by it.
-///
-/// # Errors
-/// As [`write_png`].
-pub fn write_png_with_alpha(
+pub fn write_png(
     path: &Path,
     picture: &Rgb8,
-    alpha: &[u8],
+    alpha: Option<&[u8]>,
     metadata: &[(String, String)],
 ) -> Result<()> {
-    write_beside_and_rename(path, |file| encode(file, picture, Some(alpha), metadata))
+    write_beside_and_rename(path, |file| encode(file, picture, alpha, metadata))
 }
 
 /// The bytes of an 8-bit sRGB PNG without metadata.

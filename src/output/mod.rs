@@ -10,9 +10,7 @@ use crate::color::luminance;
 use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::{
-    ExrPicture, Image, Layer, extension, write_exr, write_png, write_png_with_alpha,
-};
+use crate::image::{ExrPicture, Image, Layer, extension, write_exr, write_png};
 use crate::render::film::{Film, Pixel};
 pub use crate::render::light_groups::GroupImage;
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
@@ -201,11 +199,11 @@ pub fn write_picture(
     metadata.extend(filter_metadata(options, films));
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.to_string()));
     let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
-        return write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata);
+        return write_png(path, &display_rgb8(&image, stops, options.tone_curve), None, &metadata);
     };
     let covered = display_rgb8(&divided(image, &alpha), stops, options.tone_curve);
     let alpha: Vec<u8> = alpha.iter().map(|share| (255.0 * share).round() as u8).collect();
-    write_png_with_alpha(path, &covered, &alpha, &metadata)
+    write_png(path, &covered, Some(&alpha), &metadata)
 }
 
 /// What takes the noise out, and what helps.

@@ -42,7 +42,7 @@ pub(crate) fn maps() -> Vec<Vec<u8>> {
         height: 8,
         pixels: (0..128).map(|_| [random.next_bits() as u8; 3]).collect(),
     };
-    write_png(&path("a.png"), &rgb, &metadata).expect("written");
+    write_png(&path("a.png"), &rgb, None, &metadata).expect("written");
     let mut files = vec![hdr(24, 12, false), hdr(24, 12, true), old_runs()];
     for name in ["a.exr", "b.exr", "a.png"] {
         files.push(std::fs::read(path(name)).expect("readable"));

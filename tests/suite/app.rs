@@ -224,7 +224,7 @@ fn compare(name: &str, picture: &Rgb8) -> Result<(), String> {
     let small = shrunk(picture);
     if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
         std::fs::create_dir_all(&folder).expect("a folder");
-        write_png(&path, &small, &[]).expect("written");
+        write_png(&path, &small, None, &[]).expect("written");
         return Ok(());
     }
     let kept = image::open(&path).map_err(|e| format!("{name}: {e}"))?.into_rgb8();
@@ -240,7 +240,7 @@ fn compare(name: &str, picture: &Rgb8) -> Result<(), String> {
     let mean = sum as f64 / kept.as_raw().len() as f64;
     if mean > MEAN_ERROR {
         let now = std::env::temp_dir().join(format!("lightgrid-{name}.png"));
-        write_png(&now, &small, &[]).expect("written");
+        write_png(&now, &small, None, &[]).expect("written");
         return Err(format!("{name}: mean error {mean:.2}, see {}", now.display()));
     }
     Ok(())

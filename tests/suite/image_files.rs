@@ -353,7 +353,7 @@ fn png_round_trip_keeps_levels_and_words() {
     let pixels = (0..=255u8).map(|v| [v, 255 - v, v / 2]).collect::<Vec<_>>();
     let picture = Rgb8 { width: 64, height: 4, pixels };
     let metadata = [("Software".to_owned(), "lightgrid".into()), ("Title".into(), "厨房".into())];
-    write_png(&path, &picture, &metadata).unwrap();
+    write_png(&path, &picture, None, &metadata).unwrap();
     let linear = read_picture(&path).unwrap();
     assert_eq!(display_rgb8(&linear, 0.0, ToneCurve::None), picture);
     let bytes = fs::read(&path).unwrap();
@@ -362,7 +362,7 @@ fn png_round_trip_keeps_levels_and_words() {
     }
     let map = read_map(&path).unwrap();
     assert!(notices(&map).contains("8-bit"), "{}", notices(&map));
-    assert!(write_png(&path, &picture, &[(String::new(), "no name".into())]).is_err());
+    assert!(write_png(&path, &picture, None, &[(String::new(), "no name".into())]).is_err());
 }
 
 #[test]
@@ -386,7 +386,7 @@ fn where_a_picture_cannot_be_written_is_said() {
     let (folder, path) = temporary("picture.png");
     let write = |path: &Path| {
         let picture = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
-        write_png(path, &picture, &[]).unwrap_err().to_string()
+        write_png(path, &picture, None, &[]).unwrap_err().to_string()
     };
     assert!(write(folder.path()).ends_with("it is a folder"));
     assert!(write(&folder.path().join("no/such.png")).contains("there is no folder"));

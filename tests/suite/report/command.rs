@@ -222,7 +222,7 @@ fn what_cannot_be_reported_is_refused_at_once() {
     let picture = ExrPicture { image: &black, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("black.exr"), picture).expect("written");
     let developed = Rgb8 { width: 8, height: 8, pixels: vec![[90; 3]; 64] };
-    write_png(&bench.path("small.png"), &developed, &[]).expect("written");
+    write_png(&bench.path("small.png"), &developed, None, &[]).expect("written");
     let out = |rest: &str| format!("report {rest} -o out");
     for (line, reason) in [
         (out("none"), "neither a file nor a built-in scene"),
