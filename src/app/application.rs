@@ -15,7 +15,7 @@ use super::interface::{Dock, Interface, Tab};
 use super::library::Library;
 use super::loader::Loader;
 use super::messages::Messages;
-use super::panels::controls::Controls;
+use super::panels::scope::Scope;
 use super::reload::Reload;
 use super::rendering::Rendering;
 use super::save::Saves;
@@ -194,86 +194,50 @@ impl App {
     }
 
     fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        if self.interface.panels {
-            let Edited { document, undo, .. } = &mut self.edited;
-            let is_on_gpu = self.rendering.is_on_gpu(document.light.device);
-            panels::top::show(ui, document, &self.interface, undo, is_on_gpu, commands);
-            let status = panels::status::Status {
-                rendering: &self.rendering,
-                shown: self.display.shown.as_deref(),
-                loading: self.assets.loader.busy_with().next(),
-                document,
-                interface: &self.interface,
-                is_repeatable: self.is_repeatable,
-            };
-            panels::status::show(ui, &status, commands);
-            self.sides(ui, commands);
-            self.dock(ui, commands);
-        }
-        let area = self.viewport(ui, commands);
-        panels::prompt::show(ui.ctx(), &mut self.interface, commands);
-        panels::shortcuts::show(ui.ctx(), &mut self.interface);
-        panels::messages::show(ui.ctx(), area, &mut self.messages);
-    }
-
-    /// The panels beside the picture.
-    fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let map = self.assets.map.as_ref();
-        let sources = panels::left::Sources {
-            // While another one is read, nothing is to be chosen in the one that is shown.
-            scene: self.assets.scene_of(&self.edited.document),
-            map,
-            settings: &self.library.settings,
-            small_maps: &self.library.small_maps,
-        };
-        let exposure_ev = self.display.exposure_ev(&self.edited.document);
-        let history = &mut self.library.history;
-        let (document, interface) = (&mut self.edited.document, &mut self.interface);
-        let mut controls = Controls { document, interface, commands };
-        if !theme::is_small(ui) {
-            panels::left::show(ui, &mut controls, sources);
-        }
-        panels::right::show(ui, &mut controls, |ui, controls| match controls.interface.tab {
-            Tab::Scene => panels::left::sections(ui, controls, sources),
-            Tab::Picture => {
-                let cut_off = self.rendering.snapshot.as_ref().and_then(|s| s.cut_off.as_deref());
-                panels::picture::show(ui, controls, (exposure_ev, cut_off));
-                panels::history::show(ui, controls, history);
-            }
-            Tab::Inspect => {
-                let Rendering { inspector, snapshot, .. } = &self.rendering;
-                panels::method::show(ui, controls);
-                let Controls { interface, commands, .. } = controls;
-                panels::overlay::show(ui, interface, self.display.shown.as_deref());
-                let snapshot = snapshot.as_deref();
-                panels::inspector::show(ui, interface, inspector, map, snapshot, commands);
-            }
-        });
-    }
-
-    fn dock(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let (assets, convergence) = (&self.assets, &mut self.rendering.convergence);
-        panels::dock::show(ui, &mut self.interface, |ui, dock| match dock {
-            Dock::Convergence => {
-                let reference = assets.reference(&self.edited.document);
-                let hides_clock = self.is_repeatable;
-                panels::convergence::show(ui, convergence, hides_clock, reference, commands);
-            }
-            Dock::Needs => panels::needs::show(ui, assets.scene.as_ref(), assets.map.as_ref()),
-        });
-    }
-
-    fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) -> egui::Rect {
-        let document = &mut self.edited.document;
-        let mut scope = panels::scope::Scope {
-            scene: self.assets.scene_of(document),
+        let Edited { document, undo, .. } = &mut self.edited;
+        let mut scope = Scope {
             document,
             interface: &mut self.interface,
+            library: &mut self.library,
+            assets: &self.assets,
+            rendering: &mut self.rendering,
             display: &mut self.display,
-            rendering: &self.rendering,
-            loading: self.assets.loader.busy_with().next().is_some(),
+            is_repeatable: self.is_repeatable,
             commands,
         };
-        panels::viewport::show(ui, &mut scope)
+        if scope.interface.panels {
+            let Scope { document, interface, rendering, commands, .. } = &mut scope;
+            let is_on_gpu = rendering.is_on_gpu(document.light.device);
+            panels::top::show(ui, document, interface, undo, is_on_gpu, commands);
+            panels::status::show(ui, &mut scope);
+            if !theme::is_small(ui) {
+                panels::left::show(ui, &mut scope);
+            }
+            panels::right::show(ui, &mut scope, of_tab);
+            panels::dock::show(ui, &mut scope, |ui, scope, dock| match dock {
+                Dock::Convergence => panels::convergence::show(ui, scope),
+                Dock::Needs => panels::needs::show(ui, scope.assets),
+            });
+        }
+        let area = panels::viewport::show(ui, &mut scope);
+        panels::prompt::show(ui.ctx(), scope.interface, scope.commands);
+        panels::shortcuts::show(ui.ctx(), scope.interface);
+        panels::messages::show(ui.ctx(), area, &mut self.messages);
+    }
+}
+
+/// What the chosen tab of the right panel holds.
+fn of_tab(ui: &mut egui::Ui, scope: &mut Scope<'_>) {
+    match scope.interface.tab {
+        Tab::Scene => panels::left::sections(ui, scope),
+        Tab::Picture => {
+            panels::picture::show(ui, scope);
+            panels::history::show(ui, scope);
+        }
+        Tab::Inspect => {
+            panels::method::show(ui, scope);
+            panels::overlay::show(ui, scope);
+            panels::inspector::show(ui, scope);
+        }
     }
 }

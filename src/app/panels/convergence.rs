@@ -6,32 +6,29 @@ use egui::{Color32, Ui, Vec2b};
 use egui_plot::{Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
 use super::button::button;
+use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
 use crate::app::interface::Purpose;
 use crate::app::overlays::palette;
 use crate::app::theme;
-use crate::app::worker::{Point, Reference};
+use crate::app::worker::Point;
 
-/// Draws the plot of all runs; `by_samples_only` leaves the clock out. A reference comes with whether it shows what
-/// is rendered now.
-pub(in crate::app) fn show(
-    ui: &mut Ui,
-    convergence: &mut Convergence,
-    by_samples_only: bool,
-    reference: Option<(&Reference, bool)>,
-    commands: &mut Vec<Command>,
-) {
-    let by_samples = by_samples_only || convergence.by_samples;
+/// Draws the plot of all runs.
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let hides_clock = scope.is_repeatable;
+    let Scope { document, assets, rendering, commands, .. } = scope;
+    let convergence = &mut rendering.convergence;
+    let by_samples = hides_clock || convergence.by_samples;
     ui.horizontal_wrapped(|ui| {
-        if !by_samples_only {
+        if !hides_clock {
             ui.selectable_value(&mut convergence.by_samples, false, "Time");
             ui.selectable_value(&mut convergence.by_samples, true, "Samples");
         }
         theme::note(ui, "Earlier runs are dim");
         let hint = "A picture of this view without noise; the true error is plotted, too";
         button(ui, ("Reference…", hint), commands, Command::Ask(Purpose::Reference));
-        if let Some((reference, is_of_view)) = reference {
+        if let Some((reference, is_of_view)) = assets.reference(document) {
             if ui.button("Remove").on_hover_text(&reference.name).clicked() {
                 commands.push(Command::ForgetReference);
             }

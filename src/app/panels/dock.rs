@@ -2,14 +2,16 @@
 
 use egui::{Align, Layout, Margin, Panel, ScrollArea, Ui};
 
+use super::scope::Scope;
 use crate::app::interface::{Dock, Interface, Tab};
 
 /// Draws the tabs and what `content` draws for the chosen one; nothing when closed.
 pub(in crate::app) fn show(
     ui: &mut Ui,
-    interface: &mut Interface,
-    content: impl FnOnce(&mut Ui, Dock),
+    scope: &mut Scope<'_>,
+    content: impl FnOnce(&mut Ui, &mut Scope<'_>, Dock),
 ) {
+    let interface = &mut *scope.interface;
     if interface.dock.is_none() && interface.tab != Tab::Inspect {
         return;
     }
@@ -21,9 +23,9 @@ pub(in crate::app) fn show(
     };
     let panel = Panel::bottom("dock").frame(frame);
     panel.resizable(true).default_size(230.0).min_size(120.0).show(ui, |ui| {
-        tabs(ui, interface);
+        tabs(ui, scope.interface);
         ui.add_space(2.0);
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, dock));
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, scope, dock));
     });
 }
 

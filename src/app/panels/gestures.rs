@@ -124,6 +124,7 @@ pub(super) fn zoom(
 /// Moves the camera.
 fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut Scope<'_>) {
     let context = ui.ctx();
+    let scene = scope.scene();
     let Some(viewpoint) = &mut scope.document.viewpoint else { return };
     // Holding still counts too: letting go ends it.
     let is_zoomed = scope.interface.zoom.is_some();
@@ -143,7 +144,7 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
         } else if button == PointerButton::Middle || modifiers.shift {
             viewpoint.pan(by, whole.height());
         } else {
-            viewpoint.orbit_within(scope.scene.map(|scene| &*scene.world), by);
+            viewpoint.orbit_within(scene.map(|scene| &*scene.world), by);
         }
     }
     if response.hovered() {
@@ -156,7 +157,7 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
     let may_fly = !context.text_edit_focused() && !scope.interface.is_modal();
     hold_keys(context, may_fly, &mut scope.interface.flying);
     // Metres per second that suit the scene: a walk in a room, faster outdoors.
-    let speed = scope.scene.map_or(1.0, |scene| {
+    let speed = scene.map_or(1.0, |scene| {
         let (low, high) = scene.world.bvh.bounds();
         (0.25 * (high - low).length()).clamp(0.05, 50.0)
     });
@@ -178,7 +179,7 @@ fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
 /// The surface under a click.
 fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
     let place = place_of(rect, response.interact_pointer_pos()?);
-    let (scene, snapshot) = (scope.scene?, &scope.display.shown.as_ref()?.order.snapshot);
+    let (scene, snapshot) = (scope.scene()?, &scope.display.shown.as_ref()?.order.snapshot);
     let world = &snapshot.request.world;
     // The last picture of another scene says nothing about this one.
     let is_of_scene = Arc::ptr_eq(&world.geometry, &scene.world.geometry);

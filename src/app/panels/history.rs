@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use egui::{Id, Image, RichText, Sense, TextureOptions, Ui, Vec2};
 
-use super::controls::Controls;
+use super::scope::Scope;
 use crate::app::commands::Command;
-use crate::app::history::History;
 use crate::app::kept_picture::KeptPicture;
 use crate::app::screen::color_image;
 use crate::app::theme;
@@ -18,8 +17,9 @@ const HEIGHT: f32 = 48.0;
 const MAX_NAME: usize = 80;
 
 /// Draws the list: two can be chosen to be compared, or one and what is rendered.
-pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, history: &mut History) {
-    let (chosen, commands) = (&mut controls.interface.compared, &mut *controls.commands);
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let Scope { interface, library, commands, .. } = scope;
+    let (chosen, history) = (&mut interface.compared, &mut library.history);
     if chosen.left.is_some() {
         ui.horizontal(|ui| {
             let mut way = |is_difference, name, hint| {

@@ -3,12 +3,14 @@
 use egui::{Color32, Grid, RichText, Stroke, StrokeKind, Ui, Vec2};
 
 use super::button::button;
+use super::scope::Scope;
 use super::{color_bar, map_view, overlay, pixel_light};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector, Truth};
 use crate::app::interface::{Interface, Purpose, TileView};
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
+use crate::app::rendering::Rendering;
 use crate::app::theme;
 use crate::app::worker::Snapshot;
 use crate::environment::sun::Sun;
@@ -20,15 +22,10 @@ const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
 const LISTED: usize = 8;
 
 /// Draws the map view and the inspector.
-pub(in crate::app) fn show(
-    ui: &mut Ui,
-    interface: &mut Interface,
-    inspector: &Inspector,
-    map: Option<&LoadedMap>,
-    snapshot: Option<&Snapshot>,
-    commands: &mut Vec<Command>,
-) {
-    let Some(map) = map else { return };
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let Scope { interface, assets, rendering, commands, .. } = scope;
+    let Rendering { inspector, snapshot, .. } = &**rendering;
+    let (Some(map), snapshot) = (&assets.map, snapshot.as_deref()) else { return };
     theme::section(ui, "TILES OF THE MAP");
     tile_views(ui, interface);
     let energies: Vec<f32> =

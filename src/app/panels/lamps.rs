@@ -5,8 +5,8 @@ use std::ops::Range;
 use egui::{Align, DragValue, Label, Layout, RichText, ScrollArea, Ui, Vec2};
 use glam::Vec3;
 
-use super::controls::Controls;
 use super::late::{late, late_factor};
+use super::scope::Scope;
 use crate::app::loader::LoadedScene;
 use crate::scene::{LampEdit, PunctualLight};
 
@@ -16,8 +16,8 @@ const MAX_ROWS: usize = 8;
 const NAME_WIDTH: f32 = 102.0;
 
 /// Draws the section.
-pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
-    let Controls { document, interface, .. } = controls;
+pub(super) fn show(ui: &mut Ui, scope: &mut Scope<'_>, scene: &LoadedScene) {
+    let Scope { document, interface, .. } = scope;
     let is_late = document.mix().is_none();
     late_factor(ui, "All", "Brightness of all lamps", (&mut document.lamps, is_late));
     let mut has_changed = false;

@@ -9,15 +9,13 @@ use egui::{
 use glam::Vec3;
 
 use super::button::button;
-use super::controls::Controls;
 use super::late::{factor, late_factor};
+use super::scope::Scope;
 use super::{lamps, map_view, material};
 use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
-use crate::app::loader::{LoadedMap, LoadedScene};
-use crate::app::settings_file::{Settings, lasting_map};
-use crate::app::small_maps::SmallMaps;
+use crate::app::settings_file::lasting_map;
 use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
@@ -25,21 +23,8 @@ use crate::render::light_groups::MAX_LAMPS;
 use crate::scene::{Frame, Medium, Scene, builtin};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 
-/// What the panel is drawn from.
-#[derive(Clone, Copy)]
-pub(in crate::app) struct Sources<'a> {
-    /// The scene shown.
-    pub(in crate::app) scene: Option<&'a LoadedScene>,
-    /// The map in use.
-    pub(in crate::app) map: Option<&'a LoadedMap>,
-    /// Recent files.
-    pub(in crate::app) settings: &'a Settings,
-    /// What maps look like.
-    pub(in crate::app) small_maps: &'a SmallMaps,
-}
-
 /// Draws the panel.
-pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     let is_narrow = theme::is_narrow(ui);
     let width = if is_narrow { 258.0 } else { 286.0 };
@@ -47,32 +32,33 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>, sources: So
         if is_narrow {
             ui.spacing_mut().slider_width = 66.0;
         }
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| sections(ui, controls, sources));
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| sections(ui, scope));
     });
 }
 
 /// Draws what is in the panel.
-pub(in crate::app) fn sections(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
+pub(in crate::app) fn sections(ui: &mut Ui, scope: &mut Scope<'_>) {
     theme::heading(ui, "SCENE");
-    scene(ui, controls, sources);
+    scene(ui, scope);
     theme::heading(ui, "CAMERA");
-    cameras(ui, controls, sources.scene);
+    cameras(ui, scope);
     theme::section(ui, "ENVIRONMENT");
-    environment(ui, controls, sources);
-    if let Some(scene) = sources.scene {
+    environment(ui, scope);
+    if let Some(scene) = scope.scene() {
         if !scene.named_lamps.is_empty() {
             theme::section(ui, "LAMPS");
-            lamps::show(ui, controls, scene);
+            lamps::show(ui, scope, scene);
         }
         theme::section(ui, "FOG");
-        fog(ui, &mut controls.document.fog, &scene.world.scene);
+        fog(ui, &mut scope.document.fog, &scene.world.scene);
         theme::section(ui, "MATERIAL");
-        material::show(ui, controls, scene);
+        material::show(ui, scope, scene);
     }
 }
 
-fn scene(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
-    let Controls { document, commands, .. } = controls;
+fn scene(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let scene = scope.scene();
+    let Scope { document, commands, library, .. } = scope;
     let mut chosen = None;
     theme::choice(ui, "scene").selected_text(theme::file_name(&document.scene)).show_ui(ui, |ui| {
         theme::note(ui, "Built in");
@@ -81,11 +67,11 @@ fn scene(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
                 chosen = Some((*name).to_owned());
             }
         }
-        let files = &sources.settings.recent_scenes;
+        let files = &library.settings.recent_scenes;
         files_named(ui, "Recent", files, &document.scene, |_| None, &mut chosen);
     });
     commands.extend(chosen.map(Command::OpenScene));
-    if let Some(scene) = sources.scene {
+    if let Some(scene) = scene {
         let (low, high) = scene.world.bvh.bounds();
         let triangles = theme::count(scene.world.scene.shown_triangles());
         let frame = scene.world.scene.frame;
@@ -99,7 +85,7 @@ fn scene(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
         ));
     }
     let is_file = !is_built_in_scene(&document.scene) || !is_built_in_map(&document.map);
-    let mut reloads = sources.settings.reloads;
+    let mut reloads = library.settings.reloads;
     let hint = "Reads scene and map again when another program has written them";
     if is_file && ui.checkbox(&mut reloads, "Reload on change").on_hover_text(hint).changed() {
         commands.push(Command::ToggleReloads);
@@ -136,8 +122,9 @@ fn named(ui: &mut Ui, is_current: bool, small: Option<&TextureHandle>, name: &st
     ui.add(row)
 }
 
-fn cameras(ui: &mut Ui, controls: &mut Controls<'_>, scene: Option<&LoadedScene>) {
-    let Controls { document, commands, .. } = controls;
+fn cameras(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let scene = scope.scene();
+    let Scope { document, commands, .. } = scope;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::Vec2::splat(4.0);
         for (i, camera) in scene.iter().flat_map(|s| s.world.scene.cameras.iter()).enumerate() {
@@ -186,9 +173,10 @@ fn cameras(ui: &mut Ui, controls: &mut Controls<'_>, scene: Option<&LoadedScene>
     }
 }
 
-fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
-    let Controls { document, interface, commands } = controls;
-    if let Some(map) = sources.map {
+fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let lamps = scope.scene().map_or(0, |scene| scene.named_lamps.len());
+    let Scope { document, interface, commands, library, assets, .. } = scope;
+    if let Some(map) = &assets.map {
         let turn = document.rotation_degrees / 360.0;
         let response = map_view::preview(ui, map, turn);
         let (is_free, seen) = (!interface.is_modal(), response.rect.intersect(ui.clip_rect()));
@@ -212,23 +200,23 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
         theme::note(ui, "Built in");
         for name in sky::names() {
             let name = format!("sky:{name}");
-            let small = sources.small_maps.textures.get(&name);
+            let small = library.small_maps.textures.get(&name);
             if named(ui, document.map == name, small, &name).clicked() {
                 chosen = Some(name);
             }
         }
-        let small = |name: &str| sources.small_maps.textures.get(name);
+        let small = |name: &str| library.small_maps.textures.get(name);
         let current = lasting_map(&document.map);
-        let beside = sources.small_maps.beside(&current);
+        let beside = library.small_maps.beside(&current);
         let is_recent = |name: &String| !beside.contains(name);
         let recent: Vec<String> =
-            sources.settings.recent_maps.iter().filter(|name| is_recent(name)).cloned().collect();
+            library.settings.recent_maps.iter().filter(|name| is_recent(name)).cloned().collect();
         files_named(ui, "In its folder", beside, &current, small, &mut chosen);
         files_named(ui, "Recent", &recent, &current, small, &mut chosen);
         commands.push(Command::MakeSmallMap);
     });
     commands.extend(chosen.map(Command::OpenMap));
-    if let Some(map) = sources.map {
+    if let Some(map) = &assets.map {
         let image = map.environment.map();
         let text = format!("{} x {} pixels", image.width, image.height);
         ui.label(theme::quiet(text)).on_hover_text(format!(
@@ -257,7 +245,6 @@ fn environment(ui: &mut Ui, controls: &mut Controls<'_>, sources: Sources<'_>) {
     }
     let hint = "Brightness of the map's sun alone; its sky stays as it is";
     late_factor(ui, "Sun", hint, (&mut document.sun, is_late));
-    let lamps = sources.scene.map_or(0, |scene| scene.named_lamps.len());
     let may_mix = !document.light.split && lamps <= MAX_LAMPS;
     let mix = Checkbox::new(&mut document.light_mix, "Light mix");
     ui.add_enabled(may_mix, mix)

@@ -3,15 +3,15 @@
 use egui::{Align, RichText, Ui};
 use glam::Vec3;
 
-use super::controls::Controls;
+use super::scope::Scope;
 use crate::app::document::called;
 use crate::app::loader::LoadedScene;
 use crate::app::theme;
 use crate::scene::{Material, MaterialEdit, TextureSlot};
 
 /// Draws the section.
-pub(super) fn show(ui: &mut Ui, controls: &mut Controls<'_>, scene: &LoadedScene) {
-    let Controls { document, interface, .. } = controls;
+pub(super) fn show(ui: &mut Ui, scope: &mut Scope<'_>, scene: &LoadedScene) {
+    let Scope { document, interface, .. } = scope;
     let title = |number: u32| {
         let name = called(number, &scene.materials);
         match document.materials.get(&number) {

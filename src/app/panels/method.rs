@@ -2,7 +2,7 @@
 
 use egui::{ComboBox, RichText, Ui};
 
-use super::controls::Controls;
+use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::convergence::name_of;
 use crate::app::desktop::METHOD;
@@ -25,8 +25,8 @@ const TITLE: &str =
     "Atanasov et al., Adaptive Environment Sampling on CPU and GPU, ACM SIGGRAPH 2018 Talks";
 
 /// Draws the choice.
-pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>) {
-    let light = &mut controls.document.light;
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let light = &mut scope.document.light;
     theme::row(ui, "Sampling", "How the map is sampled; only noise and speed differ", |ui| {
         ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
             ui,
@@ -43,7 +43,7 @@ pub(in crate::app) fn show(ui: &mut Ui, controls: &mut Controls<'_>) {
     );
     let link = ui.link(RichText::new("About the method").size(12.0));
     if link.on_hover_text(format!("{TITLE}\n{METHOD}")).clicked() {
-        controls.commands.push(Command::ShowMethod);
+        scope.commands.push(Command::ShowMethod);
     }
 }
 

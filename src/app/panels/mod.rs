@@ -2,7 +2,6 @@
 
 mod button;
 mod color_bar;
-pub(super) mod controls;
 pub(super) mod convergence;
 pub(super) mod dock;
 mod gestures;

@@ -2,11 +2,11 @@
 
 use egui::{RichText, Ui};
 
-use crate::app::loader::{LoadedMap, LoadedScene};
+use crate::app::assets::Assets;
 use crate::app::theme;
 
 /// Draws two columns: what is used, what is left out.
-pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option<&LoadedMap>) {
+pub(in crate::app) fn show(ui: &mut Ui, Assets { scene, map, .. }: &Assets) {
     let Some(scene) = scene else { return };
     let needs = &scene.world.needs;
     ui.columns_const(|[left, right]| {
@@ -30,10 +30,10 @@ pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option
             kernel.full_vertex_bytes - kernel.vertex_bytes,
             kernel.full_vertex_bytes
         )));
-        if map.is_some_and(|map| map.environment.is_black()) {
+        if map.as_ref().is_some_and(|map| map.environment.is_black()) {
             right.label(theme::quiet("sampling of the map and the Light Grid: the map is black"));
         }
-        if map.is_some_and(|map| map.environment.is_constant()) {
+        if map.as_ref().is_some_and(|map| map.environment.is_constant()) {
             right.label(theme::quiet("nothing more for the map: it is the same everywhere"));
         }
     });

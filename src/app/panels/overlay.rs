@@ -3,15 +3,15 @@
 use egui::{Color32, Sense, Ui, Vec2};
 
 use super::color_bar;
-use crate::app::interface::Interface;
+use super::scope::Scope;
 use crate::app::overlays::{Legend, Overlay, palette};
-use crate::app::presenter::Shown;
 use crate::app::theme;
 use crate::app::worker::NoCache;
 use crate::radiance_cache::{CacheFacts, RadianceSums};
 
 /// Draws the choice and the legend.
-pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option<&Shown>) {
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let Scope { interface, display, .. } = scope;
     theme::heading(ui, "OVERLAY");
     let title = interface.overlay.map_or("None", Overlay::title);
     theme::choice(ui, "overlay").selected_text(title).show_ui(ui, |ui| {
@@ -27,7 +27,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
         let slider = theme::slider(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2);
         theme::set(ui, "Opacity", "", slider);
     }
-    let shown = shown.filter(|s| s.order.overlay == Some(overlay));
+    let shown = display.shown.as_ref().filter(|s| s.order.overlay == Some(overlay));
     let cache = shown.filter(|_| overlay.is_of_cache()).map(|s| &s.order.snapshot.cache);
     match shown.and_then(|s| Some(&s.painted.as_ref()?.legend)) {
         Some(shown) => legend(ui, shown),

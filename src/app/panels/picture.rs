@@ -3,20 +3,17 @@
 use egui::{DragValue, Ui};
 
 use super::button::button;
-use super::controls::Controls;
+use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::theme;
 use crate::denoise::Denoiser;
 use crate::tone::{DAYLIGHT_KELVIN, KELVIN, TINT, ToneCurve, WhiteBalance};
 
-/// Draws the settings, given the automatic exposure in stops and what maximum of bounces takes of the picture.
-pub(in crate::app) fn show(
-    ui: &mut Ui,
-    controls: &mut Controls<'_>,
-    (exposure_ev, cut_off): (Option<f32>, Option<&str>),
-) {
-    let Controls { document, commands, .. } = controls;
+/// Draws the settings.
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+    let Scope { document, display, rendering, commands, .. } = scope;
+    let exposure_ev = display.exposure_ev(document);
     theme::heading(ui, "DEVELOP");
     exposure(ui, document, exposure_ev);
     curve(ui, document);
@@ -25,7 +22,7 @@ pub(in crate::app) fn show(
     theme::section(ui, "LIGHT");
     let bounces = theme::slider(&mut document.light.bounces, 0..=64);
     theme::set(ui, "Bounces", "Maximum number of bounces; 1 is direct light", bounces);
-    if let Some(sentence) = cut_off {
+    if let Some(sentence) = rendering.snapshot.as_ref().and_then(|s| s.cut_off.as_deref()) {
         ui.weak(sentence);
     }
     let seed = theme::number(&mut document.light.seed, 0..=u32::MAX);

@@ -2,7 +2,7 @@
 
 use egui::{Margin, Panel, ScrollArea, Ui};
 
-use super::controls::Controls;
+use super::scope::Scope;
 use crate::app::interface::Tab;
 use crate::app::theme;
 
@@ -10,11 +10,11 @@ use crate::app::theme;
 /// left panel.
 pub(in crate::app) fn show(
     ui: &mut Ui,
-    controls: &mut Controls<'_>,
-    content: impl FnOnce(&mut Ui, &mut Controls<'_>),
+    scope: &mut Scope<'_>,
+    content: impl FnOnce(&mut Ui, &mut Scope<'_>),
 ) {
     let has_scene = theme::is_small(ui);
-    let interface = &mut *controls.interface;
+    let interface = &mut *scope.interface;
     if !has_scene && interface.tab == Tab::Scene {
         interface.tab = Tab::Picture;
     } else if has_scene && interface.is_material_new && interface.tab == Tab::Picture {
@@ -22,7 +22,7 @@ pub(in crate::app) fn show(
     }
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     Panel::right("right").frame(frame).exact_size(300.0).show(ui, |ui| {
-        let tab = &mut controls.interface.tab;
+        let tab = &mut scope.interface.tab;
         ui.horizontal(|ui| {
             if has_scene {
                 ui.selectable_value(tab, Tab::Scene, "Scene");
@@ -31,6 +31,6 @@ pub(in crate::app) fn show(
             ui.selectable_value(tab, Tab::Inspect, "Inspect");
         });
         ui.separator();
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, controls));
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, scope));
     });
 }

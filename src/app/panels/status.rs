@@ -4,29 +4,11 @@ use std::time::Duration;
 
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
+use super::scope::Scope;
 use crate::app::commands::Command;
-use crate::app::document::Document;
-use crate::app::interface::Interface;
-use crate::app::loader::Loading;
 use crate::app::overlays::{Overlay, value_text};
-use crate::app::presenter::Shown;
-use crate::app::rendering::Rendering;
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
-
-/// What the line is drawn from.
-pub(in crate::app) struct Status<'a> {
-    /// The worker and its latest picture.
-    pub(in crate::app) rendering: &'a Rendering,
-    /// What is on the screen.
-    pub(in crate::app) shown: Option<&'a Shown>,
-    /// A file being loaded.
-    pub(in crate::app) loading: Option<Loading<'a>>,
-    pub(in crate::app) document: &'a Document,
-    pub(in crate::app) interface: &'a Interface,
-    /// Figures that depend on the clock are left out, and those of what is pointed at.
-    pub(in crate::app) is_repeatable: bool,
-}
 
 /// What a picture is good for: word, colour, hint, and the largest relative error of blocks without noise, and of pixels
 /// with it. (Blocks of 1 and 2.5 % are FLIP of 0.05 and 0.09.)
@@ -45,29 +27,29 @@ const GRADES: [(&str, Color32, &str, [f32; 2]); 3] = [
 const MIN_LOADING_SECONDS: f64 = 1.0;
 
 /// Draws the line.
-pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 5));
     Panel::bottom("status").frame(frame).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 18.0;
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if let Some(snapshot) = &status.rendering.snapshot {
-                    let pointed = status.interface.pointed.filter(|_| !status.is_repeatable);
-                    let pointed = pointed.zip(status.shown);
+                if let Some(snapshot) = &scope.rendering.snapshot {
+                    let pointed = scope.interface.pointed.filter(|_| !scope.is_repeatable);
+                    let pointed = pointed.zip(scope.display.shown.as_ref());
                     // Where there is room for one, what is pointed at comes first.
                     if pointed.is_none() || !theme::is_narrow(ui) {
-                        device(ui, snapshot, status);
+                        device(ui, snapshot, scope);
                     }
                     if let Some((place, shown)) = pointed {
-                        pixel(ui, &shown.order.snapshot, place, status.interface.overlay);
+                        pixel(ui, &shown.order.snapshot, place, scope.interface.overlay);
                     }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.shrink_clip_rect(ui.max_rect());
-                    phase(ui, status, commands);
-                    if let Some(snapshot) = &status.rendering.snapshot {
-                        figures(ui, snapshot, status);
+                    phase(ui, scope);
+                    if let Some(snapshot) = &scope.rendering.snapshot {
+                        figures(ui, snapshot, scope);
                     }
                 });
             });
@@ -75,26 +57,26 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<
     });
 }
 
-fn phase(ui: &mut Ui, status: &Status<'_>, commands: &mut Vec<Command>) {
-    if let Some(loading) = &status.loading {
+fn phase(ui: &mut Ui, scope: &mut Scope<'_>) {
+    if let Some(loading) = scope.assets.loader.busy_with().next() {
         let name = theme::file_name(loading.name);
-        let text = match loading.seconds < MIN_LOADING_SECONDS || status.is_repeatable {
+        let text = match loading.seconds < MIN_LOADING_SECONDS || scope.is_repeatable {
             true => format!("Loading {name}…"),
             false => format!("Loading {name}: {}, {:.0} s", loading.step, loading.seconds),
         };
         ui.label(RichText::new(text).color(theme::ACCENT)).on_hover_text(loading.name);
         if ui.small_button("Cancel").on_hover_text("What is shown stays").clicked() {
-            commands.push(Command::StopLoading);
+            scope.commands.push(Command::StopLoading);
         }
         ui.ctx().request_repaint_after(Duration::from_secs(1));
         return;
     }
-    if status.rendering.worker.is_preparing() {
+    if scope.rendering.worker.is_preparing() {
         ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
             "Uploading the scene and compiling kernels takes some seconds; the CPU renders meanwhile",
         );
     }
-    let Some(snapshot) = &status.rendering.snapshot else {
+    let Some(snapshot) = &scope.rendering.snapshot else {
         ui.label(RichText::new("Starting").color(theme::ACCENT));
         return;
     };
@@ -127,10 +109,10 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
     ui.label(RichText::new(text).color(color).strong()).on_hover_text(hint);
 }
 
-fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
+fn figures(ui: &mut Ui, snapshot: &Snapshot, scope: &Scope<'_>) {
     let session = &snapshot.main;
     if matches!(snapshot.activity, Activity::Rendering | Activity::Paused | Activity::Done) {
-        let (error, column, of) = match status.document.look.denoise {
+        let (error, column, of) = match scope.document.look.denoise {
             true => (snapshot.errors.map(|errors| errors.left()), 0, "areas of 16 pixels"),
             false => (Some(session.noise as f32), 1, "a pixel"),
         };
@@ -146,7 +128,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
     }
     let hint = "Mean samples per pixel, of cached light too";
     number(ui, &theme::samples(snapshot.mean_samples()), "samples", hint);
-    if !status.is_repeatable {
+    if !scope.is_repeatable {
         let hint = "Time spent on learning and rendering, cached light included";
         number(ui, &theme::clock(snapshot.seconds()), "", hint);
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
@@ -191,8 +173,8 @@ fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
     .on_hover_text(hint);
 }
 
-fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
-    let threads = status.rendering.worker.threads();
+fn device(ui: &mut Ui, snapshot: &Snapshot, scope: &Scope<'_>) {
+    let threads = scope.rendering.worker.threads();
     let (film, view) = (&snapshot.main.film, &snapshot.request.view);
     let (width, height) = match snapshot.activity {
         Activity::Moving => (film.width, film.height),
@@ -224,7 +206,7 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
             )
         }
     };
-    let zoomed = status.interface.magnification(status.document.size);
+    let zoomed = scope.interface.magnification(scope.document.size);
     let zoomed = zoomed.map_or_else(String::new, |times| format!(" at {:.0} %", 100.0 * times));
     ui.label(theme::quiet(format!("{width} x {height}{zoomed}  ·  {name}"))).on_hover_text(hint);
 }

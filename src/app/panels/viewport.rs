@@ -34,7 +34,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let shown = scope.display.shown.clone();
         let Some((shown, settings)) = shown.as_deref().zip(settings) else {
             ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
-            waiting(ui, area, scope.loading);
+            waiting(ui, area, scope.assets.loader.busy_with().next().is_some());
             return;
         };
         let places = Places::of((area, scale), shown, scope);
