@@ -14,7 +14,6 @@ use std::sync::atomic::Ordering;
 mod device;
 mod inspection;
 mod mix_task;
-mod preparation;
 mod preview;
 mod request;
 mod session_cache;
@@ -24,17 +23,15 @@ mod snapshot;
 mod task;
 #[cfg(test)]
 pub(super) mod tests;
-mod watch;
 
 use device::Device;
 use mix_task::MixTask;
 pub(crate) use request::{Reference, Request};
 use session_cache::SessionCache;
 use sessions::Sessions;
-use shared::Shared;
+use shared::{RequestWatch, Shared};
 pub(crate) use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
 use task::PictureTask;
-use watch::RequestWatch;
 
 use super::threads::{LatestThread, Wake, lock};
 use crate::alarm::Alarm;

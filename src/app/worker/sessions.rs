@@ -6,9 +6,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::device::Device;
-use super::preparation::Preparation;
 use super::session_cache::SessionCache;
-use super::watch::RequestWatch;
+use super::shared::{Preparation, RequestWatch};
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::Result;
