@@ -28,22 +28,6 @@ pub(super) struct ReportArguments {
     #[command(subcommand)]
     what: Option<What>,
     #[command(flatten)]
-    free: FreeArguments,
-}
-
-#[derive(Debug, clap::Subcommand)]
-enum What {
-    /// Measure the talk's whole table: all its scenes, on the CPU and, if there is one, on the GPU.
-    Talk(EffortArguments),
-    /// Measure what every default of the code is worth, one change at a time.
-    Ablations(AblationArguments),
-    /// Measure the importance tables on the talk's maps and an extreme one.
-    Sat(SatArguments),
-}
-
-#[derive(Debug, clap::Args)]
-struct FreeArguments {
-    #[command(flatten)]
     places: PlaceArguments,
     /// How the map is sampled; the first one is what the others are held against.
     #[arg(long, value_delimiter = ',', default_value = "plain,talk,adaptive", value_name = "LIST")]
@@ -60,6 +44,16 @@ struct FreeArguments {
     reference: Option<PathBuf>,
     #[command(flatten)]
     effort: EffortArguments,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Measure the talk's whole table: all its scenes, on the CPU and, if there is one, on the GPU.
+    Talk(EffortArguments),
+    /// Measure what every default of the code is worth, one change at a time.
+    Ablations(AblationArguments),
+    /// Measure the importance tables on the talk's maps and an extreme one.
+    Sat(SatArguments),
 }
 
 #[derive(Debug, clap::Args)]
@@ -160,7 +154,7 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<()> {
             }
             report(&plan, &arguments.effort)
         }
-        None => report(&free(&arguments.free, command), &arguments.free.effort),
+        None => report(&free(arguments, command), &arguments.effort),
     }
 }
 
@@ -205,7 +199,7 @@ fn rows(places: &PlaceArguments) -> Vec<Row> {
         .collect()
 }
 
-fn free(arguments: &FreeArguments, command: String) -> Plan {
+fn free(arguments: &ReportArguments, command: String) -> Plan {
     let mut methods: Vec<Method> = Vec::new();
     for gi in &arguments.gi {
         for sampling in &arguments.sampling {
@@ -217,13 +211,12 @@ fn free(arguments: &FreeArguments, command: String) -> Plan {
         }
     }
     Plan {
-        title: "Error against run time".to_owned(),
-        introduction: vec![
+        title: "Error against run time",
+        introduction: &[
             "How far pictures are from what they converge to, as a function of the time spent on them, \
-             for several ways of sampling the environment map."
-                .to_owned(),
+             for several ways of sampling the environment map.",
         ],
-        differences: Vec::new(),
+        differences: &[],
         rows: rows(&arguments.places),
         methods,
         baselines: vec![0],
@@ -332,7 +325,7 @@ mod tests {
         let methods = |line: &str| {
             let words = format!("report office -o out --sampling plain,adaptive {line}");
             let arguments = Line::try_parse_from(words.split_whitespace()).expect("as it is shown");
-            free(&arguments.arguments.free, String::new()).methods
+            free(&arguments.arguments, String::new()).methods
         };
         assert_eq!(methods(""), [Sampling::Plain, Sampling::Adaptive].map(Method::of));
         let sharing: Vec<_> = methods("--sharing off").iter().map(|m| m.settings.sharing).collect();

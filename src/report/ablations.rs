@@ -34,14 +34,13 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
     let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
     methods.extend(variants().into_iter().filter(is_asked));
     Plan {
-        title: "Value of every default".to_owned(),
-        introduction: vec![
+        title: "Value of every default",
+        introduction: &[
             "Each line changes one setting of adaptive, lightgrid's default, or builds up to it from the \
              talk's form. Above 1 the change would be faster, below 1 the default is. A default is kept \
-             where the intervals do not separate it from the change."
-                .to_owned(),
+             where the intervals do not separate it from the change.",
         ],
-        differences: Vec::new(),
+        differences: &[],
         rows,
         methods,
         baselines: vec![0, 1],

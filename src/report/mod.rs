@@ -9,7 +9,6 @@
 pub mod ablations;
 mod bias;
 mod context;
-mod digest;
 mod evaluate;
 mod machine;
 mod measure;

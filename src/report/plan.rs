@@ -205,11 +205,11 @@ impl Effort {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Title of the page.
-    pub title: String,
+    pub title: &'static str,
     /// Introduction of the page, by paragraph.
-    pub introduction: Vec<String>,
+    pub introduction: &'static [&'static str],
     /// Differences between the published measurements and ours.
-    pub differences: Vec<String>,
+    pub differences: &'static [&'static str],
     /// Scenes and maps.
     pub rows: Vec<Row>,
     /// The methods that are compared on every row.

@@ -3,7 +3,6 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::digest;
 use super::machine::OpenDevice;
 use super::measure::Place;
 use super::plan::{Frame, Plan, Row, Settings};
@@ -11,8 +10,8 @@ use crate::digest::Digest;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{At as _, Notices, Result};
 use crate::light_grid::LightGrid;
-use crate::path::{World, framing};
-use crate::render::{Sampling, gpu};
+use crate::path::{Lit, World, framing};
+use crate::render::{Sampling, Session, gpu};
 use crate::scene::Camera;
 
 /// A scene under a map.
@@ -62,7 +61,7 @@ impl PreparedRow {
         let camera = world.scene.cameras.first().cloned();
         let camera = camera.unwrap_or_else(|| framing::frame(&world, aspect));
         let digest =
-            digest::of_picture((&world, &lights[0].environment), &camera, &plan.effort.frame)?;
+            digest_of_picture((&world, &lights[0].environment), &camera, &plan.effort.frame)?;
         let (title, frame) = (row.title.clone(), plan.effort.frame.clone());
         Ok(Self { title, world, camera, frame, lights, map_size, notices, digest })
     }
@@ -131,3 +130,23 @@ impl PreparedRow {
         rendered.map(|()| nanoseconds)
     }
 }
+
+/// Digest of all that a picture converges to: scene, map, camera, size and bounces. A tiny rendered picture
+/// is part of it, which nearly any change of the renderer changes: references of an older renderer are
+/// therefore not reused.
+fn digest_of_picture(lit: Lit<'_>, camera: &Camera, frame: &Frame) -> Result<Digest> {
+    let (world, environment) = lit;
+    let digest =
+        Digest::new().scene(&world.scene).debug(camera).debug(frame).map(environment.map());
+    let size = PROBE_SIZE;
+    let settings = Settings::of(Sampling::Plain);
+    let view = settings.view(camera, &Frame { size, ..frame.clone() }, 0);
+    let mut session = Session::new(world, environment, view);
+    session.advance(PROBE_SAMPLES, &AtomicBool::new(false))?;
+    session.settle()?;
+    let probe = session.film().image();
+    Ok(digest.bytes(bytemuck::cast_slice(probe.pixels.as_flattened())))
+}
+
+const PROBE_SIZE: (u32, u32) = (48, 27);
+const PROBE_SAMPLES: u32 = 4;

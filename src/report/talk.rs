@@ -40,22 +40,20 @@ pub fn plan(effort: Effort, command: String) -> Plan {
         methods.extend(modes().map(|mode| mode.with_gi(Gi::Cached)));
     }
     Plan {
-        title: "The talk's table, measured here".to_owned(),
-        introduction: vec![
+        title: "The talk's table, measured here",
+        introduction: &[
             "Atanasov et al., Adaptive Environment Sampling on CPU and GPU (ACM SIGGRAPH 2018 Talks), \
              learn which tiles of an environment map each part of the picture can see, and publish how \
              many times faster equal noise is reached. Here the same comparison is made with this \
              project's scenes: plain samples the whole map, talk is the talk's method to the letter, \
              adaptive is lightgrid's own; own paths is adaptive whose pixels share nothing, as for a \
-             denoiser."
-                .to_owned(),
+             denoiser.",
             "The talk was measured in a renderer whose paths end in a light cache after their first \
              bounce. The methods called cached do the like: their paths end at the second vertex, in a \
              cache that other paths have trained, which costs a bias. With --bounces 1 the first vertex \
-             alone is measured."
-                .to_owned(),
+             alone is measured.",
         ],
-        differences: DIFFERENCES.map(str::to_owned).to_vec(),
+        differences: &DIFFERENCES,
         rows,
         methods,
         baselines,

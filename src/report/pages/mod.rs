@@ -3,7 +3,8 @@
 use std::io::Write as _;
 use std::path::Path;
 
-mod csv;
+use askama::Template;
+
 mod format;
 mod page;
 mod pictures;
@@ -22,7 +23,7 @@ use crate::output::record::write_json;
 /// Writes all files of a report into a folder.
 pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     write_json(&folder.join("report.json"), report)?;
-    write_text(&folder.join("report.csv"), &csv::Table { report }.to_string())?;
+    write_text(&folder.join("report.csv"), &Csv { report }.to_string())?;
     let plots = folder.join("plots");
     make_folder(&plots)?;
     let page = page::Page::new(report)?;
@@ -40,6 +41,22 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
 
 pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_beside_and_rename(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// A line for each point of each run.
+#[derive(Template)]
+#[template(path = "report.csv", escape = "none")]
+struct Csv<'a> {
+    report: &'a Report,
+}
+
+/// A field as RFC 4180 wants it.
+fn field(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
 }
 
 /// A title as the name of a file.
