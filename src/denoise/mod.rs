@@ -13,8 +13,7 @@ mod samples;
 
 use std::sync::atomic::AtomicBool;
 
-use oidn::Quality;
-use samples::Samples;
+use samples::{Quality, Samples};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;

@@ -2,17 +2,9 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::samples::Samples;
+use super::samples::{Quality, Samples};
 use crate::error::{Error, Result};
 use crate::image::Image;
-
-/// Time for which noise is taken out.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Quality {
-    Fast,
-    High,
-    Prefiltered,
-}
 
 /// # Errors
 /// Always.

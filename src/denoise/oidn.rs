@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use libloading::{Library, Symbol};
 
-use super::samples::Samples;
+use super::samples::{Quality, Samples};
 use crate::error::{Error, Result};
 use crate::image::Image;
 
@@ -206,16 +206,6 @@ fn function<T>(library: &'static Library, name: &str) -> Result<Symbol<'static, 
     // SAFETY: each type above is that of the function in Intel's headers.
     unsafe { library.get(name.as_bytes()) }
         .map_err(|e| Error::new(format!("Open Image Denoise lacks {name}: {e}")))
-}
-
-/// Time for which noise is taken out, the least first.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Quality {
-    /// By the smaller network, where the version has it.
-    Fast,
-    High,
-    /// Of albedo and normals first.
-    Prefiltered,
 }
 
 /// A device or a filter, released when dropped.

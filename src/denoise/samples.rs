@@ -17,6 +17,16 @@ pub(super) struct Samples<'a> {
     scale: f64,
 }
 
+/// Time for which noise is taken out, the least first.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quality {
+    /// By the smaller network, where the version has it.
+    Fast,
+    High,
+    /// Of albedo and normals first.
+    Prefiltered,
+}
+
 /// What is known of a pixel's light.
 pub(super) struct Mean {
     pub(super) rgb: Vec3,

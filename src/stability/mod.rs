@@ -89,12 +89,14 @@ impl CaseReport {
         line
     }
 
-    /// Title, verdict, every figure, remarks, seconds.
+    /// Title, seconds, verdict, every figure, remarks.
     pub fn to_json(&self) -> Value {
-        let mut value = json!({ "case": self.title, "seconds": self.seconds });
-        if let (Some(all), Value::Object(found)) = (value.as_object_mut(), self.outcome.to_json()) {
-            all.extend(found);
-        }
-        value
+        json!({
+            "case": self.title,
+            "seconds": self.seconds,
+            "verdict": self.outcome.verdict().to_string(),
+            "figures": self.outcome.figures.iter().map(Figure::to_json).collect::<Vec<_>>(),
+            "remarks": self.outcome.remarks,
+        })
     }
 }

@@ -46,6 +46,23 @@ impl Figure {
             Limit::Info => -1.0,
         }
     }
+
+    /// What, value, limit, and whether that holds.
+    pub(super) fn to_json(&self) -> Value {
+        let number = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
+        let (bound, limit) = match self.limit {
+            Limit::AtMost(most) => ("at most", number(most)),
+            Limit::AtLeast(least) => ("at least", number(least)),
+            Limit::Info => ("info", Value::Null),
+        };
+        json!({
+            "what": self.what,
+            "value": number(self.value),
+            "bound": bound,
+            "limit": limit,
+            "holds": self.holds(),
+        })
+    }
 }
 
 /// Result of a case.
@@ -138,30 +155,6 @@ impl Outcome {
     /// The decisive figure: the first that fails, else the one nearest to its limit.
     pub fn decisive(&self) -> Option<&Figure> {
         self.figures.iter().reduce(|a, b| if b.strain() > a.strain() { b } else { a })
-    }
-
-    /// Verdict, figures and remarks.
-    pub(super) fn to_json(&self) -> Value {
-        let number = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
-        let figures = self.figures.iter().map(|figure| {
-            let (bound, limit) = match figure.limit {
-                Limit::AtMost(most) => ("at most", number(most)),
-                Limit::AtLeast(least) => ("at least", number(least)),
-                Limit::Info => ("info", Value::Null),
-            };
-            json!({
-                "what": figure.what,
-                "value": number(figure.value),
-                "bound": bound,
-                "limit": limit,
-                "holds": figure.holds(),
-            })
-        });
-        json!({
-            "verdict": self.verdict().to_string(),
-            "figures": figures.collect::<Vec<_>>(),
-            "remarks": self.remarks,
-        })
     }
 }
 
