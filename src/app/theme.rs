@@ -121,13 +121,8 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
         let height = ui.spacing().interact_size.y;
         let (rect, response) =
             ui.allocate_exact_size(Vec2::new(LABEL_WIDTH, height), egui::Sense::hover());
-        ui.painter().text(
-            rect.left_center(),
-            Align2::LEFT_CENTER,
-            name,
-            TextStyle::Body.resolve(ui.style()),
-            TEXT,
-        );
+        let font = TextStyle::Body.resolve(ui.style());
+        ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font, TEXT);
         if !hint.is_empty() {
             response.on_hover_text(keys(hint));
         }

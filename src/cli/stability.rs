@@ -102,13 +102,10 @@ fn choose(arguments: &StabilityArguments) -> Result<Vec<Case>> {
 fn conclude(reports: &[CaseReport]) -> Result<()> {
     let of =
         |verdict: Verdict| reports.iter().filter(move |report| report.outcome.verdict() == verdict);
+    let [passed, failed, skipped] =
+        [Verdict::Passed, Verdict::Failed, Verdict::Skipped].map(|verdict| of(verdict).count());
     let seconds: f64 = reports.iter().map(|report| report.seconds).sum();
-    print(format_args!(
-        "{} passed, {} failed, {} skipped in {seconds:.0} s",
-        of(Verdict::Passed).count(),
-        of(Verdict::Failed).count(),
-        of(Verdict::Skipped).count()
-    ))?;
+    print(format_args!("{passed} passed, {failed} failed, {skipped} skipped in {seconds:.0} s"))?;
     let failed: Vec<&str> = of(Verdict::Failed).map(|report| report.title.as_str()).collect();
     if failed.is_empty() {
         Ok(())

@@ -248,18 +248,14 @@ fn time_samples(table: &Table, grid: &TileGrid, energies: &[f64], samples: u32) 
 
 impl fmt::Display for SatReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "{} x {}, bilinear look-up, {:.1} % of the patches lit",
-            self.width,
-            self.height,
-            100.0 * self.lit_share
-        )?;
+        let Self { width, height, lit_share, rows } = self;
+        let lit = 100.0 * lit_share;
+        writeln!(f, "{width} x {height}, bilinear look-up, {lit:.1} % of the patches lit")?;
         writeln!(
             f,
             "table            MSE    missed missed energy   falling   misreported   build s ns/sample       MiB"
         )?;
-        for row in &self.rows {
+        for row in rows {
             writeln!(
                 f,
                 "{:<10} {:>9.1e} {:>7.2} % {:>13.1e} {:>7.2} % {:>13.1e} {:>9.3} {:>9.0} {:>9.1}",

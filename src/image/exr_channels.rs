@@ -53,11 +53,8 @@ pub(crate) fn select(headers: &[Header], notices: &mut Notices) -> Decoded<Selec
         return Err("holds deep data only, which lightgrid does not read".into());
     };
     if headers.len() > 1 {
-        notices.add(format!(
-            "of the {} parts of the file, only '{}' is read",
-            headers.len(),
-            part_name(&headers[best.part])
-        ));
+        let (count, part) = (headers.len(), part_name(&headers[best.part]));
+        notices.add(format!("of the {count} parts of the file, only '{part}' is read"));
     }
     let Channels::Grey(index) = best.channels else {
         if !best.layer.is_empty() {

@@ -242,13 +242,11 @@ impl Placement {
         let inside = meets(x, data.size.0, display.size.0) && meets(y, data.size.1, display.size.1);
         let IntegerBounds { size, .. } = if inside { display } else { data };
         if data != display {
+            let (Vec2(w, h), Vec2(of_w, of_h)) = (data.size, display.size);
+            let what = if inside { "what lies between is black" } else { "it is read alone" };
             notices.add(format!(
-                "the data window ({} x {} at {x}, {y}) is not the display window ({} x {}); {}",
-                data.size.0,
-                data.size.1,
-                display.size.0,
-                display.size.1,
-                if inside { "what lies between is black" } else { "it is read alone" }
+                "the data window ({w} x {h} at {x}, {y}) is not the display window \
+                 ({of_w} x {of_h}); {what}"
             ));
         }
         let (width, height) = check_size(size.0 as u64, size.1 as u64)?;
@@ -489,13 +487,9 @@ fn planes_of_b44(
         rest = after;
         let mut alone = header.clone();
         alone.channels = ChannelList::new(std::iter::once(channel).collect());
-        let section = IntegerBounds { position: Vec2(0, 0), size };
-        let plane = header.compression.decompress_image_section_from_le(
-            &alone,
-            own.to_vec(),
-            section,
-            false,
-        );
+        let (own, section) = (own.to_vec(), IntegerBounds { position: Vec2(0, 0), size });
+        let compression = header.compression;
+        let plane = compression.decompress_image_section_from_le(&alone, own, section, false);
         planes.push(plane.ok()?);
     }
     Some(planes)

@@ -23,12 +23,8 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<FilePicture> {
     let (major, minor) = (header.major, header.minor);
     // A row takes four bytes at the very least.
     if (rest.len() as u64) < 4 * major.count {
-        return Err(format!(
-            "is cut short: {} bytes cannot hold {} x {} pixels",
-            rest.len(),
-            header.width,
-            header.height
-        ));
+        let (bytes, Header { width, height, .. }) = (rest.len(), header);
+        return Err(format!("is cut short: {bytes} bytes cannot hold {width} x {height} pixels"));
     }
     let decoder = PixelDecoder::new(&header, &mut notices);
     let mut line = vec![[0u8; 4]; minor.count as usize];

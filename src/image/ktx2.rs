@@ -135,8 +135,8 @@ impl<'a> File<'a> {
             height: height as usize,
             format: header(12)?,
             scheme: header(44)?,
-            model: byte(descriptor, 12),
-            is_premultiplied: byte(descriptor, 15) & 1 == 1,
+            model: descriptor.get(12).copied().unwrap_or_default(),
+            is_premultiplied: descriptor.get(15).is_some_and(|flags| flags & 1 == 1),
             is_doubtful: pixel_bytes > decoder_bytes(file_bytes),
             channels: descriptor
                 .get(28..)
@@ -353,10 +353,6 @@ fn value<'a>(mut metadata: &'a [u8], key: &[u8]) -> &'a [u8] {
         metadata = metadata.get(next..).unwrap_or_default();
     }
     &[]
-}
-
-fn byte(bytes: &[u8], at: usize) -> u8 {
-    bytes.get(at).copied().unwrap_or_default()
 }
 
 /// Little-endian u32 at a byte offset.

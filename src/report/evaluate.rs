@@ -20,11 +20,10 @@ impl Context<'_> {
         let mut is_whole = true;
         while is_whole && reference.facts.pictures < pictures {
             let done = reference.facts.pictures;
-            self.say(
-                &format!("{}: reference, picture {} of {pictures}", state.prepared.title, done + 1),
-                f64::from(pictures - done) * self.plan.effort.seconds,
-                state.rows_after,
-            );
+            let (title, next) = (&state.prepared.title, done + 1);
+            let seconds = f64::from(pictures - done) * self.plan.effort.seconds;
+            let step = format!("{title}: reference, picture {next} of {pictures}");
+            self.say(&step, seconds, state.rows_after);
             let place = state.prepared.place(settings, on);
             is_whole =
                 reference.add_picture(&place, self.plan.effort.seconds)? && !self.is_cancelled();
@@ -91,11 +90,8 @@ impl Context<'_> {
             };
             let key = format!("{}_shares", self.key(state, fastest, method, 0));
             let found = self.store.kept(&key, || {
-                self.say(
-                    &format!("{}: sources of {}'s error", state.prepared.title, method.name),
-                    SHARE_RUNS * self.plan.effort.seconds,
-                    state.rows_after,
-                );
+                let step = format!("{}: sources of {}'s error", state.prepared.title, method.name);
+                self.say(&step, SHARE_RUNS * self.plan.effort.seconds, state.rows_after);
                 let on = (&self.devices[fastest], self.options.cancel);
                 let place = state.prepared.place(&method.settings, on);
                 place.shares(method, (samples / 8).max(4), &reference)

@@ -24,13 +24,8 @@ pub(super) fn show(
             4 => egui::Align2::RIGHT_TOP,
             _ => egui::Align2::CENTER_TOP,
         };
-        ui.painter().text(
-            Pos2::new(x, bar.bottom() + 3.0),
-            align,
-            text(value),
-            egui::FontId::proportional(11.0),
-            theme::QUIET,
-        );
+        let (at, font) = (Pos2::new(x, bar.bottom() + 3.0), egui::FontId::proportional(11.0));
+        ui.painter().text(at, align, text(value), font, theme::QUIET);
     }
 }
 

@@ -156,13 +156,9 @@ fn tiles(
     }
     if let Some(tile) = pointed {
         mark(tile, Color32::WHITE);
-        let share = shares.get(tile as usize).copied().unwrap_or(0.0);
-        response.on_hover_text(format!(
-            "Tile {tile}: row {}, column {}\n{}",
-            tile / size.0,
-            tile % size.0,
-            theme::percent(share)
-        ));
+        let share = theme::percent(shares.get(tile as usize).copied().unwrap_or(0.0));
+        let (row, column) = (tile / size.0, tile % size.0);
+        response.on_hover_text(format!("Tile {tile}: row {row}, column {column}\n{share}"));
     }
 }
 
@@ -250,26 +246,16 @@ fn picture(ui: &mut Ui, snapshot: &Snapshot) {
     let map = snapshot.request.environment.memory_bytes();
     let [grid, table, pixels] = [grid, map.table, map.pixels].map(theme::bytes);
     in_rows(ui, "picture", |line| {
-        line(
-            "Noise",
-            percent(session.noise as f32),
-            "Estimated relative RMS error of the pixels by exact samples alone, before denoising; too small by half with two to four samples where light is hard to find",
-        );
-        line(
-            "Error of areas",
-            percent(snapshot.errors.map_or(f32::NAN, |errors| errors.left())),
-            "Estimated relative RMS error of means of 16x16 pixels, which a denoiser leaves",
-        );
-        line(
-            "Cached light",
-            percent(snapshot.errors.map_or(0.0, |errors| errors.share())),
-            "Its share of the picture: less noise and an error of its own, for which the share falls as samples arrive",
-        );
-        line(
-            "Memory",
-            grid.clone(),
-            &format!("Light Grid {grid}, importance table {table}, map {pixels}"),
-        );
+        let hint = "Estimated relative RMS error of the pixels by exact samples alone, before denoising; too small by half with two to four samples where light is hard to find";
+        line("Noise", percent(session.noise as f32), hint);
+        let left = snapshot.errors.map_or(f32::NAN, |errors| errors.left());
+        let hint = "Estimated relative RMS error of means of 16x16 pixels, which a denoiser leaves";
+        line("Error of areas", percent(left), hint);
+        let share = snapshot.errors.map_or(0.0, |errors| errors.share());
+        let hint = "Its share of the picture: less noise and an error of its own, for which the share falls as samples arrive";
+        line("Cached light", percent(share), hint);
+        let hint = format!("Light Grid {grid}, importance table {table}, map {pixels}");
+        line("Memory", grid, &hint);
     });
 }
 
@@ -288,21 +274,13 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
     };
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
     in_rows(ui, "cell", |line| {
-        line(
-            "Cell",
-            cell,
-            "Cells of the Light Grid surround the camera: rows by elevation, columns by azimuth, one for each axis that a surface may face",
-        );
-        line(
-            "Distribution",
-            distribution,
-            "What the map is sampled by from here; a cell has its own once it has learned enough",
-        );
-        line(
-            "Position",
-            format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z),
-            "World position; y is up",
-        );
+        let hint = "Cells of the Light Grid surround the camera: rows by elevation, columns by azimuth, one for each axis that a surface may face";
+        line("Cell", cell, hint);
+        let hint =
+            "What the map is sampled by from here; a cell has its own once it has learned enough";
+        line("Distribution", distribution, hint);
+        let position = format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z);
+        line("Position", position, "World position; y is up");
         line("Material", inspected.material.clone(), "Its name in the file");
         if !inspected.probabilities.is_empty() {
             let p = &inspected.probabilities;

@@ -77,12 +77,11 @@ fn scene(ui: &mut Ui, scope: &mut Scope<'_>) {
         let frame = scene.world.scene.frame;
         let size = (high - low).to_array().map(|length| frame.length_in_file(length));
         let text = format!("{triangles} triangles, {}", theme::extent(size.into()));
-        ui.label(theme::quiet(text)).on_hover_text(format!(
-            "{} materials, {} textures; BVH {}",
-            scene.world.scene.materials.len(),
-            scene.world.scene.textures.len(),
-            theme::bytes(scene.world.bvh.memory_bytes())
-        ));
+        let Scene { materials, textures, .. } = &scene.world.scene;
+        let (materials, textures) = (materials.len(), textures.len());
+        let bvh = theme::bytes(scene.world.bvh.memory_bytes());
+        let hint = format!("{materials} materials, {textures} textures; BVH {bvh}");
+        ui.label(theme::quiet(text)).on_hover_text(hint);
     }
     let is_file = !is_built_in_scene(&document.scene) || !is_built_in_map(&document.map);
     let mut reloads = library.settings.reloads;
@@ -219,10 +218,8 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
     if let Some(map) = &assets.map {
         let image = map.environment.map();
         let text = format!("{} x {} pixels", image.width, image.height);
-        ui.label(theme::quiet(text)).on_hover_text(format!(
-            "Importance table: {}",
-            theme::bytes(map.environment.memory_bytes().table)
-        ));
+        let table = theme::bytes(map.environment.memory_bytes().table);
+        ui.label(theme::quiet(text)).on_hover_text(format!("Importance table: {table}"));
     }
     let degrees = &mut document.rotation_degrees;
     let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);

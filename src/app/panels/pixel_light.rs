@@ -62,11 +62,8 @@ fn sentences(parts: &LightParts, unblocked: f32, misplaced: Option<f32>) -> Vec<
         return vec![arriving, "No path found any light for this pixel.".to_owned()];
     }
     let samples = (parts.spread / LITTLE_NOISE).powi(2).ceil().max(1.0) as u64;
-    let noise = format!(
-        "This pixel takes {} samples until its noise is {:.0} %.",
-        theme::count(samples),
-        100.0 * LITTLE_NOISE
-    );
+    let (count, percent) = (theme::count(samples), 100.0 * LITTLE_NOISE);
+    let noise = format!("This pixel takes {count} samples until its noise is {percent:.0} %.");
     let (noisiest, _) = LightPart::ALL
         .into_iter()
         .zip(parts.noise)

@@ -9,6 +9,7 @@ use crate::app::commands::Command;
 use crate::app::overlays::{Overlay, value_text};
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
+use crate::render::gpu::AdapterFacts;
 
 /// What a picture is good for: word, colour, hint, and the largest relative error of blocks without noise, and of pixels
 /// with it. (Blocks of 1 and 2.5 % are FLIP of 0.05 and 0.09.)
@@ -183,13 +184,9 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, scope: &Scope<'_>) {
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {
             let adapter = &gpu.adapter;
-            let hint = format!(
-                "{}, {}, driver {}; {} on the device",
-                adapter.name,
-                adapter.backend,
-                adapter.driver,
-                theme::bytes(gpu.device_bytes as usize)
-            );
+            let AdapterFacts { name, backend, driver, .. } = adapter;
+            let memory = theme::bytes(gpu.device_bytes as usize);
+            let hint = format!("{name}, {backend}, driver {driver}; {memory} on the device");
             // Its name has no room where there is little.
             let name = if theme::is_small(ui) {
                 "GPU".to_owned()

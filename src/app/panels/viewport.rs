@@ -337,13 +337,8 @@ fn labels(ui: &Ui, rect: Rect, shown: &Shown) {
 
 fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
     let text = if is_loading { "Loading…" } else { "The first samples are on their way…" };
-    ui.painter().text(
-        area.center(),
-        Align2::CENTER_CENTER,
-        text,
-        FontId::proportional(15.0),
-        theme::QUIET,
-    );
+    let font = FontId::proportional(15.0);
+    ui.painter().text(area.center(), Align2::CENTER_CENTER, text, font, theme::QUIET);
 }
 
 /// The other picture, which lies in a rectangle of its own, left of a line across `rect` that can be dragged;

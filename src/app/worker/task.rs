@@ -426,6 +426,7 @@ impl<'a> PictureTask<'a> {
             self.preview.backdrop(&request, &main_snapshot.film, cached.as_ref());
         let is_quick = self.sessions.device.is_quick(&request);
         let cut_off = self.sessions.cut_off(main.samples());
+        let trained = cached.as_ref().map_or(main, |cached| &cached.session);
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {
@@ -439,12 +440,7 @@ impl<'a> PictureTask<'a> {
             errors,
             cached_seconds: self.cached_seconds,
             cut_off,
-            cache: self.inspection.cache_facts(
-                cached.as_ref().map_or(main, |cached| &cached.session),
-                &request,
-                kept,
-                is_quick,
-            ),
+            cache: self.inspection.cache_facts(trained, &request, kept, is_quick),
             curves: self.inspection.curves.clone(),
             groups: Arc::default(),
             rest: Arc::clone(&shared.throttle),
