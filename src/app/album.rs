@@ -144,10 +144,8 @@ fn read_all(folder: &Path) -> (Vec<KeptPicture>, Option<Error>) {
 /// The newest files of a folder, oldest first.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<_> = entries
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "exr"))
-        .collect();
+    let is_picture = |path: &PathBuf| path.extension().is_some_and(|it| it == "exr");
+    let mut files: Vec<_> = entries.map(|entry| entry.path()).filter(is_picture).collect();
     files.sort();
     files.split_off(files.len().saturating_sub(MAX_TRIED))
 }

@@ -180,11 +180,9 @@ fn tidy(folder: &Path) {
         let is_digest = stem.len() == 16 && stem.chars().all(|digit| digit.is_ascii_hexdigit());
         is_digest && path.extension().is_some_and(|extension| extension == "png")
     };
-    let mut files: Vec<(SystemTime, PathBuf)> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(is_ours)
-        .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
-        .collect();
+    let ours = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_ours);
+    let dated = |path: PathBuf| Some((path.metadata().ok()?.modified().ok()?, path));
+    let mut files: Vec<(SystemTime, PathBuf)> = ours.filter_map(dated).collect();
     files.sort();
     for (_, path) in files.iter().rev().skip(MAX_FILES) {
         // It may have gone by itself.

@@ -224,9 +224,8 @@ pub(super) fn is_small(ui: &Ui) -> bool {
 
 /// The last part of a path, or the whole name of what is no file.
 pub(super) fn file_name(path: &str) -> String {
-    std::path::Path::new(path)
-        .file_name()
-        .map_or_else(|| path.to_owned(), |file| file.to_string_lossy().into_owned())
+    let name = std::path::Path::new(path).file_name();
+    name.map_or_else(|| path.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Text that explains.

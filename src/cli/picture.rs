@@ -54,9 +54,8 @@ pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String
     if text == "auto" {
         return Ok(Exposure::Auto);
     }
-    values::finite(text)
-        .map(|stops| Exposure::Stops(stops as f32))
-        .map_err(|e| format!("{e} of stops, or auto"))
+    let stops = values::finite(text).map_err(|e| format!("{e} of stops, or auto"))?;
+    Ok(Exposure::Stops(stops as f32))
 }
 
 fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
@@ -78,9 +77,8 @@ impl PictureArguments {
         pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
         if self.denoise == Some(Denoise::Off) && self.denoises_linear() {
             let option = if self.rgb == LinearRgb::Denoised { "--rgb" } else { "--layers" };
-            return Err(Error::new(format!(
-                "{option} denoised wants a denoiser: it cannot be --denoise off"
-            )));
+            let cause = format!("{option} denoised wants a denoiser: it cannot be --denoise off");
+            return Err(Error::new(cause));
         }
         if self.denoise == Some(Denoise::Oidn) { Denoiser::Oidn.check() } else { Ok(()) }
     }

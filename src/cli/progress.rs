@@ -116,17 +116,13 @@ fn seconds_left(
     let rendered = figures.render_seconds + cached.1;
     let pixels = f64::from(session.view().width) * f64::from(session.view().height);
     let seconds_a_sample = rendered / (figures.samples as f64 / pixels + f64::from(cached.0));
-    let by_samples = rule
-        .samples
-        .map(|limit| seconds_a_sample * f64::from(limit.saturating_sub(session.samples())));
+    let left = rule.samples.map(|limit| limit.saturating_sub(session.samples()));
+    let by_samples = left.map(|left| seconds_a_sample * f64::from(left));
     let by_clock = rule.seconds.map(|limit| limit - session.figures().elapsed_seconds());
     let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));
-    [by_samples, by_clock, by_noise]
-        .into_iter()
-        .flatten()
-        .filter(|seconds| seconds.is_finite())
-        .min_by(f64::total_cmp)
-        .map(|seconds| seconds.max(0.0))
+    let all = [by_samples, by_clock, by_noise].into_iter().flatten();
+    let shortest = all.filter(|seconds| seconds.is_finite()).min_by(f64::total_cmp);
+    shortest.map(|seconds| seconds.max(0.0))
 }
 
 /// Seconds, in the unit that suits them.

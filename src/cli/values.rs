@@ -94,21 +94,18 @@ pub(super) fn frames(text: &str) -> Result<RangeInclusive<u32>, String> {
 
 /// `map`, `none`, `blur:DEGREES` or a colour.
 pub(super) fn background(text: &str) -> Result<Background, String> {
-    match text {
-        "map" => return Ok(Background::Map),
-        "none" => return Ok(Background::None),
-        _ => {}
+    match (text, text.strip_prefix("blur:")) {
+        ("map", _) => Ok(Background::Map),
+        ("none", _) => Ok(Background::None),
+        (_, Some(degrees)) => match finite(degrees)? {
+            degrees @ 0.0..=90.0 => Ok(Background::Blurred(degrees.to_radians() as f32)),
+            _ => Err("a blur is from 0 to 90 degrees".to_owned()),
+        },
+        _ => match coefficient(text) {
+            Ok(color) => Ok(Background::Color(color.to_array())),
+            Err(e) => Err(format!("map, none, blur:DEGREES or a colour: {e}")),
+        },
     }
-    if let Some(degrees) = text.strip_prefix("blur:") {
-        let degrees = finite(degrees)?;
-        if !(0.0..=90.0).contains(&degrees) {
-            return Err("a blur is from 0 to 90 degrees".to_owned());
-        }
-        return Ok(Background::Blurred(degrees.to_radians() as f32));
-    }
-    let color =
-        coefficient(text).map_err(|e| format!("map, none, blur:DEGREES or a colour: {e}"))?;
-    Ok(Background::Color(color.to_array()))
 }
 
 /// A number from -1 to 1.
@@ -141,11 +138,9 @@ pub(super) fn whole<T: TryFrom<u32>>(
         let Ok(number) = text.trim().parse::<i128>() else {
             return Err(format!("expected a whole number from {least} to {most}"));
         };
-        u32::try_from(number)
-            .ok()
-            .filter(|number| range.contains(number))
-            .and_then(|number| T::try_from(number).ok())
-            .ok_or_else(|| format!("{number} is not in {least}..={most}"))
+        let whole = u32::try_from(number).ok().filter(|whole| range.contains(whole));
+        let whole = whole.and_then(|whole| T::try_from(whole).ok());
+        whole.ok_or_else(|| format!("{number} is not in {least}..={most}"))
     }
 }
 
@@ -163,9 +158,6 @@ pub(super) fn not_negative(text: &str) -> Result<f32, String> {
 
 /// A finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
-    text.trim()
-        .parse::<f64>()
-        .ok()
-        .filter(|x| (*x as f32).is_finite())
-        .ok_or_else(|| "expected a number".to_owned())
+    let number = text.trim().parse().ok().filter(|x: &f64| (*x as f32).is_finite());
+    number.ok_or_else(|| "expected a number".to_owned())
 }

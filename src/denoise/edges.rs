@@ -44,10 +44,8 @@ pub(super) fn mended(
     support: &[f32],
 ) -> Image {
     let size @ [width, height] = [guides.width, guides.height];
-    let pixels: Vec<Radiance> = (0..width * height)
-        .into_par_iter()
-        .map(|index| Radiance::of(guides, light, index))
-        .collect();
+    let radiance = |index| Radiance::of(guides, light, index);
+    let pixels: Vec<Radiance> = (0..width * height).into_par_iter().map(radiance).collect();
     let filled = |index: usize| {
         if support[index] < MIN_ALIKE { regress(guides, &pixels, index) } else { pixels[index].rgb }
     };

@@ -64,9 +64,8 @@ impl Statistics {
             })
             .collect();
         if !rows.iter().all(|row| row.valid) {
-            return Err(Error::new(
-                "the environment map has radiance that is negative or not finite",
-            ));
+            let cause = "the environment map has radiance that is negative or not finite";
+            return Err(Error::new(cause));
         }
         let sum: DVec3 = rows.iter().map(|row| row.sum).sum();
         let constant = rows.iter().all(|row| row.constant);

@@ -106,11 +106,8 @@ fn edges(patches: u32, tiles: u32) -> Vec<u32> {
 
 /// Which interval each patch lies in.
 fn owners(edges: &[u32]) -> Vec<u32> {
-    edges
-        .windows(2)
-        .zip(0..)
-        .flat_map(|(edge, tile)| std::iter::repeat_n(tile, (edge[1] - edge[0]) as usize))
-        .collect()
+    let lengths = edges.windows(2).map(|edge| (edge[1] - edge[0]) as usize);
+    (0..).zip(lengths).flat_map(|(tile, length)| std::iter::repeat_n(tile, length)).collect()
 }
 
 #[cfg(test)]

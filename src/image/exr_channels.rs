@@ -43,12 +43,9 @@ const PICTURE_NAMES: [&str; 6] = ["rgba", "rgb", "color", "colour", "combined", 
 /// # Errors
 /// If all parts are deep.
 pub(crate) fn select(headers: &[Header], notices: &mut Notices) -> Decoded<Selection> {
-    let best = headers
-        .iter()
-        .enumerate()
-        .filter(|(_, header)| !header.deep)
-        .flat_map(|(part, header)| candidates(part, header, headers.len() == 1))
-        .min_by_key(|candidate| candidate.rank);
+    let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
+    let all = flat.flat_map(|(part, header)| candidates(part, header, headers.len() == 1));
+    let best = all.min_by_key(|candidate| candidate.rank);
     let Some(best) = best else {
         return Err("holds deep data only, which lightgrid does not read".into());
     };

@@ -141,15 +141,10 @@ fn decode<R: Read + Seek>(
     let meta = chunks.meta_data().clone();
     let batch_size = batch_size(&header);
     loop {
-        let batch: Vec<Chunk> = chunks
-            .by_ref()
-            .take(batch_size)
-            .collect::<exr::error::Result<_>>()
-            .map_err(|e| decode_cause(&e))?;
-        let blocks: Vec<Block> = batch
-            .into_par_iter()
-            .map(|chunk| block_decoder.decode(chunk, &meta))
-            .collect::<Decoded<_>>()?;
+        let batch = chunks.by_ref().take(batch_size).collect::<exr::error::Result<Vec<_>>>();
+        let batch = batch.map_err(|e| decode_cause(&e))?.into_par_iter();
+        let decoded = batch.map(|chunk| block_decoder.decode(chunk, &meta));
+        let blocks: Vec<Block> = decoded.collect::<Decoded<_>>()?;
         // Not before there is something to show: a small file may claim a large display window.
         if image.pixels.is_empty() {
             image.pixels = memory::filled(u64::from(width) * u64::from(height), [0.0; 3])?;
@@ -369,10 +364,8 @@ impl BlockDecoder {
                 (channel, step, samples * sample_type.bytes_per_sample())
             })
             .collect();
-        let bytes: usize = (0..height)
-            .flat_map(|row| lines.iter().filter(move |(_, step, _)| has_samples(row, *step)))
-            .map(|(.., bytes)| bytes)
-            .sum();
+        let of_row = |row| lines.iter().filter(move |(_, step, _)| has_samples(row, *step));
+        let bytes: usize = (0..height).flat_map(of_row).map(|(.., bytes)| bytes).sum();
         let is_b44 = matches!(header.compression, Compression::B44 | Compression::B44A);
         // What packing would make larger is stored plainly.
         let is_plain = matches!(&chunk.compressed_block, CompressedBlock::ScanLine(block)
@@ -407,9 +400,7 @@ impl BlockDecoder {
         let mut pixels = vec![[f32::NAN; 3]; width * height];
         let mut rest = data.as_slice();
         for (row, line) in pixels.chunks_exact_mut(width).enumerate() {
-            for &(channel, step, bytes) in
-                lines.iter().filter(|(_, step, _)| has_samples(row, *step))
-            {
+            for &(channel, step, bytes) in of_row(row) {
                 let (samples, after) = rest.split_at_checked(bytes).ok_or_else(damaged)?;
                 rest = after;
                 for i in (0..3).filter(|i| self.channels.indices().get(*i) == Some(&channel)) {

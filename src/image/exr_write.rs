@@ -74,14 +74,10 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
     for (name, value) in metadata {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }
-    attributes.preview = preview.map(|small| Preview {
-        size: Vec2(small.width as usize, small.height as usize),
-        pixel_data: small
-            .pixels
-            .iter()
-            .flat_map(|&[r, g, b]| [r, g, b, 255])
-            .map(u8::cast_signed)
-            .collect(),
+    attributes.preview = preview.map(|small| {
+        let size = Vec2(small.width as usize, small.height as usize);
+        let bytes = small.pixels.iter().flat_map(|&[r, g, b]| [r, g, b, 255]);
+        Preview { size, pixel_data: bytes.map(u8::cast_signed).collect() }
     });
     let encoding = Encoding {
         compression: Compression::ZIP16,

@@ -197,9 +197,8 @@ struct PixelDecoder {
 
 impl PixelDecoder {
     fn new(header: &Header, notices: &mut Notices) -> Self {
-        let mut scale: Vec<[f32; 3]> = (0..256)
-            .map(|e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32))
-            .collect();
+        let of = |e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32);
+        let mut scale: Vec<[f32; 3]> = (0..256).map(of).collect();
         scale[0] = [0.0; 3];
         let primaries = header.primaries.filter(|primaries| !primaries.is(RADIANCE));
         let to_rec709 = match primaries {
@@ -258,10 +257,8 @@ fn read_runs(rest: &mut &[u8], line: &mut [[u8; 4]], channel: usize) -> Decoded<
     while filled < line.len() {
         let code = take(rest, 1)?[0];
         let count = usize::from(if code > 128 { code - 128 } else { code });
-        let pixels = line
-            .get_mut(filled..filled + count)
-            .filter(|_| count > 0)
-            .ok_or("has a damaged row")?;
+        let pixels = line.get_mut(filled..filled + count).filter(|_| count > 0);
+        let pixels = pixels.ok_or("has a damaged row")?;
         if code > 128 {
             let value = take(rest, 1)?[0];
             pixels.iter_mut().for_each(|pixel| pixel[channel] = value);

@@ -129,6 +129,7 @@ impl<'a> File<'a> {
         let short = |at| part(word(bytes, at)?.into(), word(bytes, at + 4)?.into());
         let long = |at| part(long_word(bytes, at)?, long_word(bytes, at + 8)?);
         let descriptor = short(48).ok_or_else(cut)?;
+        let samples = descriptor.get(28..).unwrap_or_default().chunks_exact(16);
         let metadata = short(56).ok_or_else(cut)?;
         Ok(Self {
             width: width as usize,
@@ -138,12 +139,7 @@ impl<'a> File<'a> {
             model: descriptor.get(12).copied().unwrap_or_default(),
             is_premultiplied: descriptor.get(15).is_some_and(|flags| flags & 1 == 1),
             is_doubtful: pixel_bytes > decoder_bytes(file_bytes),
-            channels: descriptor
-                .get(28..)
-                .unwrap_or_default()
-                .chunks_exact(16)
-                .map(|sample| sample[3] & 15)
-                .collect(),
+            channels: samples.map(|sample| sample[3] & 15).collect(),
             levels: levels.max(1) as usize,
             level: long(80).ok_or_else(cut)?,
             global: long(64).ok_or_else(cut)?,

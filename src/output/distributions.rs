@@ -19,10 +19,8 @@ pub fn write_distributions(path: &Path, grid: &LightGrid) -> Result<()> {
     let distributions = grid.distributions();
     let tiles = distributions.tile_count();
     let cells: Vec<(u32, u32)> = grid.grid().map_or_else(Vec::new, |cells| {
-        (0..cells.cell_count())
-            .map(|cell| (cell, grid.distribution_of_cell(cell)))
-            .filter(|(_, distribution)| *distribution != WHOLE_MAP)
-            .collect()
+        let all = (0..cells.cell_count()).map(|cell| (cell, grid.distribution_of_cell(cell)));
+        all.filter(|(_, distribution)| *distribution != WHOLE_MAP).collect()
     });
     let row = |distribution: u32| {
         (0..tiles).map(move |tile| distributions.probability(distribution, tile))
@@ -40,10 +38,8 @@ pub fn write_distributions(path: &Path, grid: &LightGrid) -> Result<()> {
         Some("json") => {
             let all: Vec<Vec<f32>> =
                 (0..distributions.len()).map(|distribution| row(distribution).collect()).collect();
-            let cells: serde_json::Map<_, _> = cells
-                .iter()
-                .map(|(cell, distribution)| (cell.to_string(), json!(distribution)))
-                .collect();
+            let entries = cells.iter().map(|(cell, own)| (cell.to_string(), json!(own)));
+            let cells: serde_json::Map<_, _> = entries.collect();
             let value =
                 json!({ "tiles": tiles, "distribution_of_cell": cells, "distributions": all });
             record::write_json(path, &value)

@@ -81,12 +81,8 @@ impl FilmFacts {
     /// The names of what differs from another picture, joined for a sentence; `None` if nothing does.
     pub fn difference(&self, other: &[(String, String)]) -> Option<String> {
         let value = |name: &str| other.iter().find(|(key, _)| key == name).map(|(_, value)| value);
-        let names: Vec<&str> = self
-            .picture
-            .iter()
-            .filter(|(name, own)| value(name) != Some(own))
-            .map(|(name, _)| name.as_str())
-            .collect();
+        let apart = self.picture.iter().filter(|(name, own)| value(name) != Some(own));
+        let names: Vec<&str> = apart.map(|(name, _)| name.as_str()).collect();
         (!names.is_empty()).then(|| names.join(", "))
     }
 }

@@ -212,10 +212,8 @@ fn filter_metadata(options: &PictureOptions, films: Films<'_>) -> Vec<(String, S
     let cached = films.cached.map(|(cached, _)| {
         ("lightgrid.cached_samples_per_pixel".to_owned(), cached.min_samples().to_string())
     });
-    [("lightgrid.denoiser".to_owned(), filter.name().to_owned())]
-        .into_iter()
-        .chain(cached)
-        .collect()
+    let filter = ("lightgrid.denoiser".to_owned(), filter.name().to_owned());
+    std::iter::once(filter).chain(cached).collect()
 }
 
 /// The exposure of a film's picture, for that of others, too.
@@ -293,11 +291,8 @@ fn layers(film: &Film, whole: &Film, names: &[LayerName]) -> Vec<Layer> {
 }
 
 fn split(pixels: &[[f32; 3]], names: [&str; 3]) -> Vec<(String, Vec<f32>)> {
-    names
-        .into_iter()
-        .enumerate()
-        .map(|(i, name)| (name.to_owned(), pixels.iter().map(|p| p[i]).collect()))
-        .collect()
+    let values = |channel: usize| pixels.iter().map(|pixel| pixel[channel]).collect();
+    names.into_iter().zip(0..).map(|(name, i)| (name.to_owned(), values(i))).collect()
 }
 
 #[cfg(test)]

@@ -96,10 +96,8 @@ impl Context<'_> {
         ));
         let readable =
             format!("{}-{}-{}", state.prepared.title, device.device.title(), method.name);
-        let readable: String = readable
-            .chars()
-            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
-            .collect();
+        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+        let readable: String = readable.chars().map(plain).collect();
         let tail = readable.len().saturating_sub(80);
         format!("{}_{seed}_{digest}", &readable[tail..])
     }

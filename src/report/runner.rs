@@ -7,7 +7,7 @@ use super::context::{Context, Options, RowState, denoised};
 use super::machine::{Machine, OpenDevice};
 use super::measure::Run;
 use super::pages::row_sentence;
-use super::plan::{MIN_PICTURES, Plan, Row, SHARE_RUNS};
+use super::plan::{Device, MIN_PICTURES, Plan, Row, SHARE_RUNS};
 use super::prepared_row::PreparedRow;
 use super::reference::{Reference, read_reference};
 use super::store::Store;
@@ -31,12 +31,8 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
     });
     let store = Store::open(options.folder, options.references)?;
     let machine = Machine::here();
-    let devices = plan
-        .effort
-        .devices
-        .iter()
-        .map(|device| OpenDevice::open(*device, options.adapter, &machine))
-        .collect::<Result<Vec<_>>>()?;
+    let open = |device: &Device| OpenDevice::open(*device, options.adapter, &machine);
+    let devices = plan.effort.devices.iter().map(open).collect::<Result<Vec<_>>>()?;
     let machine_digest = machine.digest();
     let mut runner = Runner {
         context: Context { plan, options, store, devices, machine_digest, file_reference },
@@ -82,9 +78,9 @@ impl Runner<'_> {
             ..RowReport::default()
         };
         self.report.rows.push(report);
-        let reference = file_reference
-            .is_none()
-            .then(|| Reference::open(&store.references, prepared.digest, plan.effort.frame.size));
+        let (digest, size) = (prepared.digest, plan.effort.frame.size);
+        let open = || Reference::open(&store.references, digest, size);
+        let reference = file_reference.is_none().then(open);
         let mut state = RowState {
             runs: vec![vec![Vec::new(); plan.methods.len()]; devices.len()],
             refusals: vec![None; devices.len()],
@@ -260,10 +256,8 @@ impl Runner<'_> {
         let plan = self.context.plan;
         let done: usize = state.runs.iter().flatten().map(Vec::len).sum();
         let all = plan.methods.len() * plan.effort.devices.len() * plan.effort.seeds as usize;
-        let reference = state
-            .reference
-            .as_ref()
-            .map_or(0, |reference| reference.pictures_missing(plan.effort.reference_noise, 0.0));
+        let missing = |of: &Reference| of.pictures_missing(plan.effort.reference_noise, 0.0);
+        let reference = state.reference.as_ref().map_or(0, missing);
         let left = (all - done) as f64 + f64::from(reference) + SHARE_RUNS;
         let (title, method) = (&state.prepared.title, &plan.methods[method].name);
         let device = self.context.devices[device].device.title();
@@ -283,9 +277,8 @@ pub fn check(plan: &Plan) -> Result<()> {
         crate::sources::check_map(&row.map)?;
     }
     if plan.reference.is_some() && plan.rows.len() != 1 {
-        return Err(Error::new(
-            "--reference is a picture of one scene under one map: give one of each",
-        ));
+        let cause = "--reference is a picture of one scene under one map: give one of each";
+        return Err(Error::new(cause));
     }
     Ok(())
 }

@@ -37,11 +37,8 @@ pub struct Interval {
 /// Slope of a power law through positive points, by least squares in logarithms; `None` for fewer
 /// than two different abscissae.
 pub fn power_law_slope(points: &[(f64, f64)]) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = points
-        .iter()
-        .filter(|(x, y)| *x > 0.0 && *y > 0.0)
-        .map(|(x, y)| (x.ln(), y.ln()))
-        .collect();
+    let positive = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0);
+    let logs: Vec<(f64, f64)> = positive.map(|(x, y)| (x.ln(), y.ln())).collect();
     let count = logs.len() as f64;
     let (mean_x, mean_y) =
         logs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
@@ -104,10 +101,8 @@ impl Bundle {
         let mut seconds: Vec<f64> = (0..STEPS).map(step).collect();
         seconds[0] = start;
         seconds[STEPS as usize - 1] = end;
-        let errors = curves
-            .iter()
-            .map(|curve| seconds.iter().map(|&t| curve.at(t)).collect::<Option<Vec<f64>>>())
-            .collect::<Option<_>>()?;
+        let of_curve = |curve: &Curve| seconds.iter().map(|t| curve.at(*t)).collect();
+        let errors = curves.iter().map(of_curve).collect::<Option<Vec<Vec<f64>>>>()?;
         Some(Self { seconds, errors })
     }
 
@@ -135,9 +130,8 @@ impl Bundle {
 
     /// Mean error and its standard error at every time.
     pub fn estimates(&self) -> Vec<Option<Estimate>> {
-        (0..self.seconds.len())
-            .map(|i| Estimate::of(&self.errors.iter().map(|run| run[i]).collect::<Vec<_>>()))
-            .collect()
+        let errors = |i: usize| self.errors.iter().map(|run| run[i]).collect::<Vec<_>>();
+        (0..self.seconds.len()).map(|i| Estimate::of(&errors(i))).collect()
     }
 }
 

@@ -76,10 +76,8 @@ impl Store {
     /// Stores pictures of one size under a name, as little-endian floats without a header.
     pub(super) fn write_pictures(&self, key: &str, pictures: &[Image]) -> Result<()> {
         write_beside_and_rename(&self.path(key, "f32"), |file| {
-            pictures
-                .iter()
-                .flat_map(|p| p.pixels.as_flattened())
-                .try_for_each(|x| file.write_all(&x.to_le_bytes()))
+            let mut values = pictures.iter().flat_map(|p| p.pixels.as_flattened());
+            values.try_for_each(|x| file.write_all(&x.to_le_bytes()))
         })
     }
 

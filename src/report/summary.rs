@@ -377,12 +377,9 @@ const SLOPE_FROM: (f64, u32) = (1.0 / 16.0, 4);
 
 fn slope(run: &Run, measure: Measure) -> Option<f64> {
     let end = run.points.last()?.render_seconds;
-    let points: Vec<(f64, f64)> = run
-        .points
-        .iter()
-        .filter(|p| p.samples >= SLOPE_FROM.1 && p.render_seconds >= SLOPE_FROM.0 * end)
-        .filter_map(|p| Some((p.render_seconds, measure.of(p)?)))
-        .collect();
+    let is_late = |p: &&Point| p.samples >= SLOPE_FROM.1 && p.render_seconds >= SLOPE_FROM.0 * end;
+    let place = |p: &Point| Some((p.render_seconds, measure.of(p)?));
+    let points: Vec<(f64, f64)> = run.points.iter().filter(is_late).filter_map(place).collect();
     if points.len() < 3 { None } else { power_law_slope(&points) }
 }
 

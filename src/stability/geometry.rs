@@ -121,10 +121,8 @@ fn bouncing_leaks(setting: &Setting) -> Outcome {
     let mut outcome = Outcome::default();
     for size in [1e-4_f32, 1.0, 1e4] {
         let tree = cube(5, size);
-        let missed: u32 = (0..64_u64)
-            .into_par_iter()
-            .map(|seed| bounce(&tree, seed, setting.count(20_000, 2_000_000)))
-            .sum();
+        let missed = |seed| bounce(&tree, seed, setting.count(20_000, 2_000_000));
+        let missed: u32 = (0..64_u64).into_par_iter().map(missed).sum();
         let what = format!("paths that leave a box of {size} m");
         outcome = outcome.at_most(what, f64::from(missed), 0.0);
     }

@@ -71,9 +71,8 @@ fn black(setting: &Setting) -> Result<Outcome> {
     let map = Image::filled(40, 20, [0.0; 3]);
     let environment = Environment::new(map, &EnvironmentOptions::default())?;
     let mut random = SplitMix(1);
-    let drawn = (0..environment.tile_count())
-        .filter(|tile| environment.sample_in_tile(*tile, random.next_words()).is_some())
-        .count();
+    let mut draw = |tile| environment.sample_in_tile(tile, random.next_words());
+    let drawn = (0..environment.tile_count()).filter_map(&mut draw).count();
     let outcome =
         Outcome::default().at_most("tiles of a black map that can be sampled", drawn as f64, 0.0);
     let film = floor(setting, &environment, 4)?;
@@ -208,9 +207,8 @@ fn chi_square(environment: &Environment) -> Result<f64> {
             |i: u32, bins: u32, all: u32| (u64::from(i) * u64::from(bins) / u64::from(all)) as u32;
         (of(y, rows, height) * columns + of(x, columns, width)) as usize
     };
-    let lit: Vec<u32> = (0..environment.tile_count())
-        .filter(|tile| environment.tile_energies()[*tile as usize] > 0.0)
-        .collect();
+    let is_lit = |tile: &u32| environment.tile_energies()[*tile as usize] > 0.0;
+    let lit: Vec<u32> = (0..environment.tile_count()).filter(is_lit).collect();
     let per_tile = SAMPLES / lit.len().max(1);
     let mut observed = vec![0.0; (columns * rows) as usize];
     let mut random = SplitMix(31);

@@ -64,11 +64,9 @@ fn sentences(parts: &LightParts, unblocked: f32, misplaced: Option<f32>) -> Vec<
     let samples = (parts.spread / LITTLE_NOISE).powi(2).ceil().max(1.0) as u64;
     let (count, percent) = (theme::count(samples), 100.0 * LITTLE_NOISE);
     let noise = format!("This pixel takes {count} samples until its noise is {percent:.0} %.");
-    let (noisiest, _) = LightPart::ALL
-        .into_iter()
-        .zip(parts.noise)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((LightPart::Seen, 0.0));
+    let noises = LightPart::ALL.into_iter().zip(parts.noise);
+    let noisiest = noises.max_by(|a, b| a.1.total_cmp(&b.1));
+    let (noisiest, _) = noisiest.unwrap_or((LightPart::Seen, 0.0));
     let help = match (noisiest, misplaced) {
         _ if samples <= 4 => return vec![arriving, noise],
         (LightPart::Seen, _) => {

@@ -91,14 +91,11 @@ fn phase(ui: &mut Ui, scope: &mut Scope<'_>) {
             let paths = [snapshot.now.learning_paths, snapshot.request.view.learning_paths];
             let [traced, all] = paths.map(theme::count);
             let text = format!("Learning {traced} / {all} paths");
-            ui.add(
-                egui::ProgressBar::new(share)
-                    .desired_width(190.0)
-                    .desired_height(16.0)
-                    .fill(Color32::from_rgb(122, 86, 34))
-                    .text(RichText::new(text).size(11.5).color(theme::TEXT)),
-            )
-            .on_hover_text("Learning which tiles of the map each part of the picture can see");
+            let text = RichText::new(text).size(11.5).color(theme::TEXT);
+            let bar = egui::ProgressBar::new(share).desired_width(190.0).desired_height(16.0);
+            let bar = bar.fill(Color32::from_rgb(122, 86, 34)).text(text);
+            let hint = "Learning which tiles of the map each part of the picture can see";
+            ui.add(bar).on_hover_text(hint);
         }
         Activity::Rendering => word(ui, "Rendering", theme::ACCENT, "Adding samples"),
         Activity::Paused => word(ui, "Paused", theme::SECOND, "Space resumes"),

@@ -120,9 +120,8 @@ impl Device {
         if session.is_on_gpu() || self.awaits(session, request, environment) {
             return;
         }
-        let placed = self
-            .upload(&gpu, request, environment)
-            .and_then(|uploaded| session.continue_on_gpu_if_compiled(uploaded, preparation));
+        let uploaded = self.upload(&gpu, request, environment);
+        let placed = uploaded.and_then(|on| session.continue_on_gpu_if_compiled(on, preparation));
         match placed {
             Ok(held) => {
                 self.awaited = held.map(|held| Awaited {

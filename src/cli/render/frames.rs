@@ -63,9 +63,8 @@ impl<'a> Frames<'a> {
         let [first, last, end] = [numbers.start(), numbers.end(), all.end()];
         if last > end {
             let count = end + 1;
-            return Err(Error::new(format!(
-                "--frames {first}..{last}: the last of a turn's {count} is {end}"
-            )));
+            let cause = format!("--frames {first}..{last}: the last of a turn's {count} is {end}");
+            return Err(Error::new(cause));
         }
         if last > first && (arguments.part.is_some() || arguments.checkpoint.is_some()) {
             return Err(Error::new("--part and --checkpoint are of one frame, such as --frames 3"));

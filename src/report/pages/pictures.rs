@@ -56,10 +56,8 @@ impl Window {
         let mut best = (-1.0, Self { x: 0, y: 0, width, height });
         for y in (0..=noisy.height - height).step_by(step_y as usize) {
             for x in (0..=noisy.width - width).step_by(step_x as usize) {
-                let sum: f32 = (y..y + height)
-                    .flat_map(|y| (x..x + width).map(move |x| (x, y)))
-                    .map(|(x, y)| error(x, y))
-                    .sum();
+                let pixels = (y..y + height).flat_map(|y| (x..x + width).map(move |x| (x, y)));
+                let sum: f32 = pixels.map(|(x, y)| error(x, y)).sum();
                 if sum > best.0 {
                     best = (sum, Self { x, y, width, height });
                 }
