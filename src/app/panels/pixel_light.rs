@@ -69,26 +69,22 @@ fn sentences(parts: &LightParts, unblocked: f32, misplaced: Option<f32>) -> Vec<
     let (noisiest, _) = noisiest.unwrap_or((LightPart::Seen, 0.0));
     let help = match (noisiest, misplaced) {
         _ if samples <= 4 => return vec![arriving, noise],
-        (LightPart::Seen, _) => {
-            "Most noise is in what the camera sees directly: samples alone help."
-        }
+        (LightPart::Seen, _) => "what the camera sees directly: samples alone help",
         (LightPart::MapDirect, None) => {
-            "Most noise is in the map's direct light: choose adaptive sampling, which learns what is visible."
+            "the map's direct light: choose adaptive sampling, which learns what is visible"
         }
         (LightPart::MapDirect, Some(share)) if share > LEARNED_WELL => {
-            "Most noise is in the map's direct light, and what was learned here is far from the truth: more samples teach it."
+            "the map's direct light, and what was learned here is far from the truth: more samples teach it"
         }
         (LightPart::MapDirect, _) => {
-            "Most noise is in the map's direct light, which was learned well: an edge of a shadow needs samples."
+            "the map's direct light, which was learned well: an edge of a shadow needs samples"
         }
-        (LightPart::LampsDirect, _) => {
-            "Most noise is in the lamps' direct light: fewer or larger lamps help."
-        }
+        (LightPart::LampsDirect, _) => "the lamps' direct light: fewer or larger lamps help",
         (LightPart::MapReflected | LightPart::LampsReflected, _) => {
-            "Most noise is in light that several surfaces reflect: denoising with cached light removes it."
+            "light that several surfaces reflect: denoising with cached light removes it"
         }
     };
-    vec![arriving, noise, help.to_owned()]
+    vec![arriving, noise, format!("Most noise is in {help}.")]
 }
 
 #[cfg(test)]
