@@ -337,34 +337,28 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
         }
         found
     };
-    runs.into_iter()
-        .zip(&plan.methods)
-        .enumerate()
-        .map(|(index, (runs, method))| MethodReport {
+    let summary = |(index, (runs, method)): (usize, (Vec<Run>, &Method))| {
+        let bundle = |measure: Measure| bundles[index][measure as usize].as_ref();
+        let error = |m: Measure| Some((m, (*bundle(m)?.estimates().last()?)?));
+        // FLIP has no power law.
+        let power_laws = [Measure::TrimmedRelMse, Measure::RelMse, Measure::Mse, Measure::Blocks];
+        let power = |m: Measure| Some((m, estimate(&runs, |run| slope(run, m))?));
+        let clean = |denoised: &Bundle| CLEAN_FLIP.map(|flip| denoised.seconds_to(flip));
+        let efficiency = efficiencies[plan.baselines[0]].zip(efficiencies[index]);
+        MethodReport {
             method: method.clone(),
-            errors: Measure::ALL
-                .into_iter()
-                .zip(&bundles[index])
-                .filter_map(|(m, b)| Some((m, (*b.as_ref()?.estimates().last()?)?)))
-                .collect(),
-            clean_seconds: bundles[index][Measure::DenoisedFlip as usize]
-                .as_ref()
-                .map_or([None; 3], |bundle| CLEAN_FLIP.map(|flip| bundle.seconds_to(flip))),
+            errors: Measure::ALL.into_iter().filter_map(error).collect(),
+            clean_seconds: bundle(Measure::DenoisedFlip).map_or([None; 3], clean),
             mean_ratio: estimate(&runs, |run| Some(run.points.last()?.errors?.mean_ratio)),
-            // FLIP has no power law.
-            slopes: [Measure::TrimmedRelMse, Measure::RelMse, Measure::Mse, Measure::Blocks]
-                .into_iter()
-                .filter_map(|m| Some((m, estimate(&runs, |run| slope(run, m))?)))
-                .collect(),
+            slopes: power_laws.into_iter().filter_map(power).collect(),
             speed_ups: speed_ups(index),
-            without_learning: efficiencies[plan.baselines[0]]
-                .zip(efficiencies[index])
-                .map(|(baseline, own)| baseline.mean / own.mean),
+            without_learning: efficiency.map(|(baseline, own)| baseline.mean / own.mean),
             costs: costs(&runs, threads),
             memory: max_memory(&runs),
             runs,
-        })
-        .collect()
+        }
+    };
+    runs.into_iter().zip(&plan.methods).enumerate().map(summary).collect()
 }
 
 fn estimate(runs: &[Run], value: impl Fn(&Run) -> Option<f64>) -> Option<Estimate> {
