@@ -295,15 +295,12 @@ impl App {
         let snapshot = &shown.order.snapshot;
         let view = &snapshot.request.view;
         // What was seen from elsewhere is none of it.
-        let of_size = shown.image.clone().filter(|_| !shown.is_carried && !shown.is_coarse);
-        let of_size =
-            of_size.filter(|image| (image.width, image.height) == (view.width, view.height));
+        let image = shown.image.clone().filter(|_| !shown.is_carried && !shown.is_coarse);
+        let has_image = image.is_some();
+        let size = (view.width, view.height);
+        let of_size = image.filter(|image| (image.width, image.height) == size);
         // As long as a smaller picture says more, it is that which is shown.
-        let is_small = shown.image.is_some()
-            && of_size.is_none()
-            && !shown.is_carried
-            && !shown.is_coarse
-            && snapshot.activity != Activity::Done;
+        let is_small = has_image && of_size.is_none() && snapshot.activity != Activity::Done;
         let is_whole = snapshot.is_lasting() && !is_small && self.is_of_document(snapshot);
         is_whole.then(|| of_size.unwrap_or_else(|| Arc::new(shown.order.image())))
     }

@@ -122,18 +122,17 @@ impl App {
     /// Puts the scene or the map that is shown back into the document. Pictures of the other one that were to be saved
     /// are given up; `why` is the reason.
     pub(super) fn stay(&mut self, kind: Kind, why: &str) {
-        match kind {
+        let is_shown = match kind {
             // One that is read again is still shown.
-            Kind::Scene => {
-                if self.assets.scene_of(&self.edited.document).is_none() {
-                    self.messages.errors(self.saves.give_up(why));
-                }
-                stay_in_scene(&mut self.edited, &self.assets, &self.library);
-            }
+            Kind::Scene => self.assets.scene_of(&self.edited.document).is_some(),
+            Kind::Map => self.rendering.snapshot.is_some(),
+        };
+        if !is_shown {
+            self.messages.errors(self.saves.give_up(why));
+        }
+        match kind {
+            Kind::Scene => stay_in_scene(&mut self.edited, &self.assets, &self.library),
             Kind::Map => {
-                if self.rendering.snapshot.is_none() {
-                    self.messages.errors(self.saves.give_up(why));
-                }
                 let shown = self.assets.map.as_ref();
                 let shown = shown.map(|map| (map.name.clone(), map.sun_factor));
                 // At the start there is none: the built-in one is always there.
