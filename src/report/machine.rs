@@ -29,17 +29,16 @@ impl Machine {
     /// This one, now.
     pub fn here() -> Self {
         let optimised = if cfg!(debug_assertions) { "development build" } else { "release build" };
+        let version = env!("CARGO_PKG_VERSION");
+        let loads = fs::read_to_string("/proc/loadavg");
         Self {
             processor: processor(),
             threads: rayon::current_num_threads(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             build: format!(
-                "lightgrid {}, {optimised}, samples of version {SAMPLES_VERSION}",
-                env!("CARGO_PKG_VERSION")
+                "lightgrid {version}, {optimised}, samples of version {SAMPLES_VERSION}"
             ),
-            load: fs::read_to_string("/proc/loadavg")
-                .ok()
-                .and_then(|text| text.split_whitespace().next()?.parse().ok()),
+            load: loads.ok().and_then(|text| text.split_whitespace().next()?.parse().ok()),
         }
     }
 

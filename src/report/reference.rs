@@ -218,14 +218,13 @@ pub(super) fn read_reference(path: &Path, size: (u32, u32)) -> Result<Image> {
             "is developed for a display, and errors are those of linear light: give an .exr";
         return Err(Error::at(path, cause));
     }
-    if (image.width, image.height) != size {
-        return Err(Error::at(
-            path,
-            format!(
-                "the reference is {}x{} pixels, the runs are {}x{}: give --size {}x{}",
-                image.width, image.height, size.0, size.1, image.width, image.height
-            ),
-        ));
+    let (width, height) = (image.width, image.height);
+    if (width, height) != size {
+        let runs = format!("the runs are {}x{}", size.0, size.1);
+        let cause = format!(
+            "the reference is {width}x{height} pixels, {runs}: give --size {width}x{height}"
+        );
+        return Err(Error::at(path, cause));
     }
     if crate::metrics::mean(&image) <= 0.0 {
         return Err(Error::at(path, "is black: errors relative to it have no meaning"));

@@ -52,9 +52,8 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     } else {
         theme::note(ui, "Click a tile to see which cells sample it.");
     }
-    ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
-        "Keeps the learned distributions, around their old centre, when the camera or a setting changes",
-    );
+    let hint = "Keeps the learned distributions, around their old centre, when the camera or a setting changes";
+    ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(hint);
     if let Some(snapshot) = snapshot {
         theme::section(ui, "PICTURE");
         picture(ui, snapshot);

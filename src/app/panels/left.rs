@@ -189,10 +189,9 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
             document.rotation_degrees = (document.rotation_degrees + degrees).rem_euclid(360.0);
             interface.keep_turning(ui.ctx());
         }
-        response.on_hover_text(
-            "Drag to turn the map. The middle of the picture is seen along +X, the left quarter \
-             along -Z",
-        );
+        let hint = "Drag to turn the map. The middle of the picture is seen along +X, the left quarter \
+                    along -Z";
+        response.on_hover_text(hint);
     }
     let mut chosen = None;
     theme::choice(ui, "map").selected_text(theme::file_name(&document.map)).show_ui(ui, |ui| {
@@ -244,14 +243,10 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
     late_factor(ui, "Sun", hint, (&mut document.sun, is_late));
     let may_mix = !document.light.split && lamps <= MAX_LAMPS;
     let mix = Checkbox::new(&mut document.light_mix, "Light mix");
-    ui.add_enabled(may_mix, mix)
-        .on_hover_text(
-            "Sky, sun and each lamp get a picture of their own. Intensity, sun and lamps then change what is \
-             shown at once. All these pictures take their share of time and memory",
-        )
-        .on_disabled_hover_text(format!(
-            "Not beside a split view, nor with more than {MAX_LAMPS} lamps"
-        ));
+    let hint = "Sky, sun and each lamp get a picture of their own. Intensity, sun and lamps then change what is \
+                shown at once. All these pictures take their share of time and memory";
+    let why_not = format!("Not beside a split view, nor with more than {MAX_LAMPS} lamps");
+    ui.add_enabled(may_mix, mix).on_hover_text(hint).on_disabled_hover_text(why_not);
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
         let text = RichText::new("Reset rotation, intensity and sun").size(12.0);

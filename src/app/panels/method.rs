@@ -38,9 +38,8 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
             },
         );
     });
-    ui.checkbox(&mut light.split, "Split view").on_hover_text(
-        "Plain sampling on the left, the chosen one on the right, for equal time (V)",
-    );
+    let hint = "Plain sampling on the left, the chosen one on the right, for equal time (V)";
+    ui.checkbox(&mut light.split, "Split view").on_hover_text(hint);
     let link = ui.link(RichText::new("About the method").size(12.0));
     if link.on_hover_text(format!("{TITLE}\n{METHOD}")).clicked() {
         scope.commands.push(Command::ShowMethod);

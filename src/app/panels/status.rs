@@ -73,9 +73,8 @@ fn phase(ui: &mut Ui, scope: &mut Scope<'_>) {
         return;
     }
     if scope.rendering.worker.is_preparing() {
-        ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
-            "Uploading the scene and compiling kernels takes some seconds; the CPU renders meanwhile",
-        );
+        let hint = "Uploading the scene and compiling kernels takes some seconds; the CPU renders meanwhile";
+        ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(hint);
     }
     let Some(snapshot) = &scope.rendering.snapshot else {
         ui.label(RichText::new("Starting").color(theme::ACCENT));
