@@ -104,42 +104,19 @@ fn front(
     let reach = if side < 2 { -0.006 } else { -0.004 };
     pierced(b, m.wall, [-reach, -0.03, width + reach, height - 0.1], FRONT, &holes);
     b.slab(m.trim, [-0.03, GROUND - 0.14, -0.05], [width + 0.03, GROUND, 0.07], 0.02);
-    plinth(b, m.base, width, &openings);
-    for window in &windows {
-        window_frame(b, m.frame, *window, 0.12, [2, 3], 0.0);
-        surround(b, m, *window);
-    }
-    for (opening, is_door) in &openings {
-        if *is_door {
-            door_leaf(b, m, *opening);
-        } else {
-            window_frame(b, m.frame, *opening, 0.10, [if shops { 3 } else { 2 }, 2], 0.0);
-            sill(b, m.trim, *opening);
-        }
-        let [u0, _, u1, v1] = *opening;
-        b.slab(m.trim, [u0 - 0.14, v1 + 0.001, -0.05], [u1 + 0.14, v1 + 0.19, 0.045], 0.012);
-    }
-}
-
-/// The base course, interrupted by doors.
-fn plinth(b: &mut Builder, mat: Mat, width: f32, openings: &[([f32; 4], bool)]) {
+    // The base course, interrupted by doors.
     let mut from = -0.035;
     for ([u0, _, u1, _], _) in openings.iter().filter(|o| o.1) {
-        b.slab(mat, [from, -0.03, -0.05], [u0 - 0.10, 0.45, 0.055], 0.015);
+        b.slab(m.base, [from, -0.03, -0.05], [u0 - 0.10, 0.45, 0.055], 0.015);
         from = u1 + 0.10;
     }
-    b.slab(mat, [from, -0.03, -0.05], [width + 0.035, 0.45, 0.055], 0.015);
-}
-
-fn sill(b: &mut Builder, mat: Mat, [u0, v0, u1, _]: [f32; 4]) {
-    b.slab(mat, [u0 - 0.08, v0 - 0.09, -0.10], [u1 + 0.08, v0 + 0.012, 0.09], 0.012);
-}
-
-fn surround(b: &mut Builder, m: &HouseMats, window: [f32; 4]) {
-    let [u0, v0, u1, v1] = window;
-    sill(b, m.trim, window);
-    b.slab(m.trim, [u0 - 0.10, v1 + 0.001, -0.05], [u1 + 0.10, v1 + 0.16, 0.03], 0.012);
-    if let Some(shutter) = m.shutter {
+    b.slab(m.base, [from, -0.03, -0.05], [width + 0.035, 0.45, 0.055], 0.015);
+    for window in &windows {
+        window_frame(b, m.frame, *window, 0.12, [2, 3], 0.0);
+        sill(b, m.trim, *window);
+        let [u0, v0, u1, v1] = *window;
+        b.slab(m.trim, [u0 - 0.10, v1 + 0.001, -0.05], [u1 + 0.10, v1 + 0.16, 0.03], 0.012);
+        let Some(shutter) = m.shutter else { continue };
         let w = 0.5 * (u1 - u0);
         for (left, right) in [(u0 - w - 0.012, u0 - 0.012), (u1 + 0.012, u1 + w + 0.012)] {
             b.slab(shutter, [left, v0 + 0.02, 0.004], [right, v1 - 0.002, 0.03], 0.004);
@@ -150,21 +127,31 @@ fn surround(b: &mut Builder, m: &HouseMats, window: [f32; 4]) {
             }
         }
     }
+    for (opening, is_door) in &openings {
+        let [u0, v0, u1, v1] = *opening;
+        if *is_door {
+            let leaf = m.shutter.unwrap_or(m.frame);
+            let light = v1 - 0.5;
+            b.slab(leaf, [u0 - 0.01, v0 - 0.04, -0.21], [u1 + 0.01, light, -0.15], 0.006);
+            window_frame(b, m.frame, [u0, light, u1, v1], 0.13, [3, 1], 0.0);
+            let middle = 0.5 * (u0 + u1);
+            for (left, right) in [(u0 + 0.07, middle - 0.04), (middle + 0.04, u1 - 0.07)] {
+                for (low, high) in [(v0 + 0.2, v0 + 0.9), (v0 + 1.05, light - 0.15)] {
+                    b.slab(leaf, [left, low, -0.16], [right, high, -0.13], 0.018);
+                }
+            }
+            b.ball(m.trim, Vec3::new(middle + 0.02, v0 + 1.0, -0.12), 0.028);
+            b.slab(m.base, [u0 - 0.08, -0.02, -0.27], [u1 + 0.08, 0.015, 0.30], 0.01);
+        } else {
+            window_frame(b, m.frame, *opening, 0.10, [if shops { 3 } else { 2 }, 2], 0.0);
+            sill(b, m.trim, *opening);
+        }
+        b.slab(m.trim, [u0 - 0.14, v1 + 0.001, -0.05], [u1 + 0.14, v1 + 0.19, 0.045], 0.012);
+    }
 }
 
-fn door_leaf(b: &mut Builder, m: &HouseMats, [u0, v0, u1, v1]: [f32; 4]) {
-    let leaf = m.shutter.unwrap_or(m.frame);
-    let light = v1 - 0.5;
-    b.slab(leaf, [u0 - 0.01, v0 - 0.04, -0.21], [u1 + 0.01, light, -0.15], 0.006);
-    window_frame(b, m.frame, [u0, light, u1, v1], 0.13, [3, 1], 0.0);
-    let middle = 0.5 * (u0 + u1);
-    for (left, right) in [(u0 + 0.07, middle - 0.04), (middle + 0.04, u1 - 0.07)] {
-        for (low, high) in [(v0 + 0.2, v0 + 0.9), (v0 + 1.05, light - 0.15)] {
-            b.slab(leaf, [left, low, -0.16], [right, high, -0.13], 0.018);
-        }
-    }
-    b.ball(m.trim, Vec3::new(middle + 0.02, v0 + 1.0, -0.12), 0.028);
-    b.slab(m.base, [u0 - 0.08, -0.02, -0.27], [u1 + 0.08, 0.015, 0.30], 0.01);
+fn sill(b: &mut Builder, mat: Mat, [u0, v0, u1, _]: [f32; 4]) {
+    b.slab(mat, [u0 - 0.08, v0 - 0.09, -0.10], [u1 + 0.08, v0 + 0.012, 0.09], 0.012);
 }
 
 /// A round arch in a wall's frame between columns at `u0` and `u1`: the wall above it from

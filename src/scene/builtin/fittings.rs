@@ -53,11 +53,12 @@ fn architrave(b: &mut Builder, mat: Mat, [u0, v0, u1, v1]: [f32; 4]) {
     b.slab(mat, [u0 - 0.003, v1 + 0.0006, z[0]], [u1 + 0.003, v1 + w - 0.001, z[1] - 0.001], 0.006);
 }
 
-/// Skirting and cornices along the walls of a room, `heights` high; the last wall has a door between `door` along it.
+/// Skirting and quarter-round cornices along the walls of a room, `heights` high; the last wall has
+/// a door between `door` along it.
 pub(super) fn edges(
     b: &mut Builder,
     walls: &[Wall; 4],
-    [skirting_mat, cornice_mat]: [Mat; 2],
+    [skirting, cornice]: [Mat; 2],
     ceiling: f32,
     door: [f32; 2],
     heights: [f32; 2],
@@ -66,31 +67,24 @@ pub(super) fn edges(
         b.part(wall.frame(), |b| {
             let (beside, whole) = ([[0.0, door[0]], [door[1], wall.width]], [[0.0, wall.width]]);
             let stretches: &[[f32; 2]] = if i == 3 { &beside } else { &whole };
-            skirting(b, skirting_mat, stretches, heights[0]);
-            cornice(b, cornice_mat, wall.width, ceiling + 0.004, heights[1]);
+            let [height, radius] = heights;
+            for &[u0, u1] in stretches {
+                b.slab(skirting, [u0, -0.01, -0.01], [u1, height - 0.025, 0.018], 0.002);
+                let (low, high) =
+                    ([u0 + 0.0005, height - 0.03, -0.009], [u1 - 0.0005, height, 0.012]);
+                b.slab(skirting, low, high, 0.006);
+            }
+            b.sheet(cornice, [1, 12], Vec2::new(wall.width, radius), |u, v| {
+                let (s, c) = (v * 0.5 * PI).sin_cos();
+                let swell = 0.12 * radius * (v * TAU).sin();
+                Vec3::new(
+                    u * (wall.width + 0.02) - 0.01,
+                    ceiling + 0.004 - radius * (1.0 - s) - 0.5 * swell,
+                    radius * (1.0 - c) + 0.5 * swell,
+                )
+            });
         });
     }
-}
-
-/// Skirting along a wall between the given stretches (u from, u to), in the wall's frame.
-fn skirting(b: &mut Builder, mat: Mat, stretches: &[[f32; 2]], height: f32) {
-    for &[u0, u1] in stretches {
-        b.slab(mat, [u0, -0.01, -0.01], [u1, height - 0.025, 0.018], 0.002);
-        b.slab(mat, [u0 + 0.0005, height - 0.03, -0.009], [u1 - 0.0005, height, 0.012], 0.006);
-    }
-}
-
-/// A quarter-round ceiling moulding along a wall of `width`, in the wall's frame.
-fn cornice(b: &mut Builder, mat: Mat, width: f32, height: f32, radius: f32) {
-    b.sheet(mat, [1, 12], Vec2::new(width, radius), |u, v| {
-        let (s, c) = (v * 0.5 * PI).sin_cos();
-        let swell = 0.12 * radius * (v * TAU).sin();
-        Vec3::new(
-            u * (width + 0.02) - 0.01,
-            height - radius * (1.0 - s) - 0.5 * swell,
-            radius * (1.0 - c) + 0.5 * swell,
-        )
-    });
 }
 
 /// Raised rectangular moulding on a wall, in the wall's frame.
