@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::materials::{self, matte, textured};
 use super::mesh::{Builder, Mat, placed};
-use super::room::{self, Hole, Shell};
+use super::room::{self, Hole};
 use super::{objects, textures};
 use crate::scene::Scene;
 
@@ -30,8 +30,8 @@ pub(super) fn build() -> Scene {
     let clay = b.material(matte("glazed clay", [0.50, 0.26, 0.14], 0.25));
     let sack = b.material(matte("sackcloth", [0.56, 0.46, 0.31], 0.95));
 
-    let shell = Shell { walls: [brick; 4], floor, ceiling };
-    room::room(b, &shell, SIZE, THICKNESS, [&[Hole::Rectangle(SLIT)], &[], &[], &[]]);
+    let mats = [brick, brick, brick, brick, floor, ceiling];
+    room::room(b, mats, SIZE, THICKNESS, [&[Hole::Rectangle(SLIT)], &[], &[], &[]]);
     for x in [-1.2, 0.0, 1.2] {
         b.slab(wood, [x - 0.07, SIZE[1] - 0.16, -1.52], [x + 0.07, SIZE[1] + 0.01, 1.52], 0.008);
     }

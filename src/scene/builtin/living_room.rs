@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 
 use super::materials::{self, embossed, matte, palette, textured, two_sided, varnished};
 use super::mesh::{Builder, LIFT, Mat, placed};
-use super::room::{self, Hole, Shell};
+use super::room::{self, Hole};
 use super::{fittings, furniture, lamps, objects, plants, reliefs, seating, textures};
 use crate::scene::{Material, Scene};
 
@@ -19,30 +19,19 @@ palette! {
         let size = Vec2::splat(1.9);
         let parquet = b.texture(textures::herringbone([0.46, 0.29, 0.16]), size);
         let blocks = b.data(reliefs::herringbone(size), size);
-        let size = Vec2::new(1.4, 0.7);
-        let oak = b.texture(textures::timber([0.50, 0.34, 0.19]), size);
-        let walnut = b.texture(textures::timber([0.23, 0.13, 0.075]), size);
-        let grain = b.data(reliefs::timber(size), size);
-        let size = Vec2::splat(2.5);
-        let plaster = b.texture(textures::plaster([0.78, 0.75, 0.69], 0.10), size);
-        let accent = b.texture(textures::plaster([0.24, 0.33, 0.30], 0.16), size);
-        let trowel = b.data(reliefs::plaster(size), size);
-        let size = Vec2::splat(0.20);
-        let velvet = b.texture(textures::weave([0.52, 0.20, 0.085], 64), size);
-        let pile = b.data(reliefs::weave(size, 64), size);
-        let size = Vec2::splat(0.16);
-        let boucle = b.texture(textures::weave([0.74, 0.69, 0.60], 32), size);
-        let loops = b.data(reliefs::weave(size, 32), size);
+        let tones = [[0.50, 0.34, 0.19], [0.23, 0.13, 0.075]];
+        let ([oak, walnut], grain) = materials::timber(b, tones);
+        let tones = [([0.78, 0.75, 0.69], 0.10), ([0.24, 0.33, 0.30], 0.16)];
+        let ([plaster, accent], trowel) = materials::plaster(b, 2.5, tones);
+        let ([velvet], pile) = materials::weave(b, 0.20, 64, [[0.52, 0.20, 0.085]]);
+        let ([boucle], loops) = materials::weave(b, 0.16, 32, [[0.74, 0.69, 0.60]]);
         let linen = b.texture(textures::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
         let ochre = b.texture(textures::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
         let rug = b.texture(
             textures::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
             Vec2::new(2.9, 2.0),
         );
-        let arts = [0, 1, 2].map(|k| {
-            let art = b.texture(textures::painting(k), Vec2::ONE);
-            b.material(textured("painting", art, 0.55))
-        });
+        let arts = [0, 1, 2].map(|seed| materials::painting(b, seed));
     }
     wall = embossed(textured("wall", plaster, 0.85), trowel),
     accent = embossed(textured("green wall", accent, 0.8), trowel),
@@ -103,10 +92,9 @@ pub(super) fn build(name: &str, lamps: [f32; 3]) -> Scene {
 }
 
 fn shell(b: &mut Builder, m: &Palette) {
-    let shell =
-        Shell { walls: [m.wall, m.wall, m.accent, m.wall], floor: m.parquet, ceiling: m.ceiling };
+    let mats = [m.wall, m.wall, m.accent, m.wall, m.parquet, m.ceiling];
     let holes: [&[Hole]; 4] = [&[], &[Hole::Rectangle(WINDOW)], &[], &[Hole::Round(ROUND)]];
-    room::room(b, &shell, SIZE, THICKNESS, holes);
+    room::room(b, mats, SIZE, THICKNESS, holes);
     let walls = room::walls(SIZE);
     fittings::edges(b, &walls, [m.white, m.ceiling], SIZE[1], [0.43, 1.47], [0.12, 0.10]);
     b.part(walls[2].frame(), |b| {

@@ -1,8 +1,13 @@
 //! The materials that built-in scenes share.
 
-use glam::Vec4;
+use glam::{Vec2, Vec4};
 
+use super::mesh::{Builder, Mat};
+use super::{reliefs, textures};
 use crate::scene::{Material, TextureRef, TextureSlot};
+
+/// Colour textures, and the normal map that belongs to them all.
+type Embossed<const N: usize> = ([TextureRef; N], TextureRef);
 
 /// Declares what a scene is made of: materials in the order in which `Palette::new` makes them, after what it
 /// prepares for them with a builder. An entry without a type is a material; one with a type is an expression of it.
@@ -45,6 +50,41 @@ pub(super) fn matte(name: &str, rgb: [f32; 3], roughness: f32) -> Material {
 /// A dielectric whose albedo comes from a texture.
 pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Material {
     matte(name, [1.0; 3], roughness).with_texture(TextureSlot::BaseColor, texture)
+}
+
+/// Timber of some tones for furniture, grain along u.
+pub(super) fn timber<const N: usize>(b: &mut Builder, tones: [[f32; 3]; N]) -> Embossed<N> {
+    let size = Vec2::new(1.4, 0.7);
+    (tones.map(|tone| b.texture(textures::timber(tone), size)), b.data(reliefs::timber(size), size))
+}
+
+/// Plaster of some tones and of the strengths of their clouds, which repeats after so many `metres`.
+pub(super) fn plaster<const N: usize>(
+    b: &mut Builder,
+    metres: f32,
+    tones: [([f32; 3], f32); N],
+) -> Embossed<N> {
+    let size = Vec2::splat(metres);
+    let colors = tones.map(|(tone, clouds)| b.texture(textures::plaster(tone, clouds), size));
+    (colors, b.data(reliefs::plaster(size), size))
+}
+
+/// Cloth of some tones with `threads` over so many `metres`.
+pub(super) fn weave<const N: usize>(
+    b: &mut Builder,
+    metres: f32,
+    threads: i32,
+    tones: [[f32; 3]; N],
+) -> Embossed<N> {
+    let size = Vec2::splat(metres);
+    let colors = tones.map(|tone| b.texture(textures::weave(tone, threads), size));
+    (colors, b.data(reliefs::weave(size, threads), size))
+}
+
+/// One of three paintings.
+pub(super) fn painting(b: &mut Builder, seed: u32) -> Mat {
+    let art = b.texture(textures::painting(seed), Vec2::ONE);
+    b.material(textured("painting", art, 0.55))
 }
 
 /// A material with a normal map.
@@ -90,4 +130,9 @@ pub(super) fn ceramic() -> Material {
 /// Thin clear glass.
 pub(super) fn glass(name: &str, rgb: [f32; 3]) -> Material {
     Material { transmission: 1.0, double_sided: true, ..matte(name, rgb, 0.0) }
+}
+
+/// Clear glass that fills a closed surface.
+pub(super) fn solid_glass(name: &str, roughness: f32) -> Material {
+    Material { transmission: 1.0, thickness: 0.1, ..matte(name, [1.0; 3], roughness) }
 }

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 
 use super::materials::{self, embossed, matte, metal, palette, textured, two_sided, varnished};
 use super::mesh::{Builder, Mat, placed};
-use super::room::{self, Hole, Shell};
+use super::room::{self, Hole};
 use super::{desktop, fittings, furniture, lamps, objects, plants, reliefs, seating, textures};
 use crate::scene::Scene;
 
@@ -19,26 +19,17 @@ palette! {
         let size = Vec2::new(2.6, 1.6);
         let boards = b.texture(textures::planks([0.40, 0.27, 0.16], 10, 2), size);
         let joints = b.data(reliefs::planks(size, 10, 2), size);
-        let size = Vec2::new(1.4, 0.7);
-        let oak = b.texture(textures::timber([0.52, 0.36, 0.21]), size);
-        let grain = b.data(reliefs::timber(size), size);
-        let size = Vec2::splat(2.5);
-        let plaster = b.texture(textures::plaster([0.76, 0.74, 0.70], 0.10), size);
-        let feature = b.texture(textures::plaster([0.60, 0.41, 0.31], 0.14), size);
-        let trowel = b.data(reliefs::plaster(size), size);
-        let size = Vec2::splat(0.19);
-        let blue = b.texture(textures::weave([0.16, 0.24, 0.36], 64), size);
-        let grey = b.texture(textures::weave([0.44, 0.43, 0.41], 64), size);
-        let threads = b.data(reliefs::weave(size, 64), size);
+        let ([oak], grain) = materials::timber(b, [[0.52, 0.36, 0.21]]);
+        let tones = [([0.76, 0.74, 0.70], 0.10), ([0.60, 0.41, 0.31], 0.14)];
+        let ([plaster, feature], trowel) = materials::plaster(b, 2.5, tones);
+        let tones = [[0.16, 0.24, 0.36], [0.44, 0.43, 0.41]];
+        let ([blue, grey], threads) = materials::weave(b, 0.19, 64, tones);
         let linen = b.texture(textures::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
             textures::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
             Vec2::new(2.6, 1.7),
         );
-        let arts = [1, 0].map(|k| {
-            let art = b.texture(textures::painting(k), Vec2::ONE);
-            b.material(textured("painting", art, 0.55))
-        });
+        let arts = [1, 0].map(|seed| materials::painting(b, seed));
     }
     wall = embossed(textured("wall", plaster, 0.85), trowel),
     feature = embossed(textured("clay wall", feature, 0.85), trowel),
@@ -86,10 +77,9 @@ pub(super) fn build() -> Scene {
 }
 
 fn shell(b: &mut Builder, m: &Palette) {
-    let shell =
-        Shell { walls: [m.wall, m.wall, m.feature, m.wall], floor: m.boards, ceiling: m.ceiling };
+    let mats = [m.wall, m.wall, m.feature, m.wall, m.boards, m.ceiling];
     let windows = WINDOWS.map(Hole::Rectangle);
-    room::room(b, &shell, SIZE, THICKNESS, [&windows, &[], &[], &[]]);
+    room::room(b, mats, SIZE, THICKNESS, [&windows, &[], &[], &[]]);
     let walls = room::walls(SIZE);
     fittings::edges(b, &walls, [m.white, m.ceiling], SIZE[1], [0.33, 1.37], [0.10, 0.07]);
     b.part(walls[0].frame(), |b| {

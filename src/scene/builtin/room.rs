@@ -59,20 +59,11 @@ pub(super) fn walls([sx, _, sz]: [f32; 3]) -> [Wall; 4] {
     ]
 }
 
-/// Materials of a room's shell.
-pub(super) struct Shell {
-    /// Of the walls -X, +X, -Z, +Z.
-    pub(super) walls: [Mat; 4],
-    /// Floor.
-    pub(super) floor: Mat,
-    /// Ceiling.
-    pub(super) ceiling: Mat,
-}
-
-/// A closed room `[-sx/2, sx/2] x [0, sy] x [-sz/2, sz/2]` with `holes` in its walls.
+/// A closed room `[-sx/2, sx/2] x [0, sy] x [-sz/2, sz/2]` with `holes` in its walls; materials are
+/// those of the walls -X, +X, -Z, +Z, the floor and the ceiling.
 pub(super) fn room(
     b: &mut Builder,
-    shell: &Shell,
+    [mats @ .., floor, ceiling]: [Mat; 6],
     size: [f32; 3],
     thickness: f32,
     holes: [&[Hole]; 4],
@@ -83,12 +74,12 @@ pub(super) fn room(
         let reach = if i < 2 { thickness } else { OVERLAP };
         b.part(wall.frame(), |b| {
             let span = [-reach, -OVERLAP, wall.width + reach, sy + OVERLAP];
-            pierced(b, shell.walls[i], span, thickness, holes[i]);
+            pierced(b, mats[i], span, thickness, holes[i]);
         });
     }
     let (x, z) = (0.5 * sx + thickness - 0.01, 0.5 * sz + thickness - 0.01);
-    b.slab(shell.floor, [-x, -thickness, -z], [x, 0.0, z], 0.0);
-    b.slab(shell.ceiling, [-x, sy, -z], [x, sy + thickness, z], 0.0);
+    b.slab(floor, [-x, -thickness, -z], [x, 0.0, z], 0.0);
+    b.slab(ceiling, [-x, sy, -z], [x, sy + thickness, z], 0.0);
 }
 
 /// A plate `span` = (u0, v0, u1, v1) wide, its face at z = 0 and its back at z = -thickness.

@@ -2,11 +2,11 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::materials::{self, embossed, glass, matte, metal, textured, two_sided, varnished};
 use super::mesh::{Builder, placed};
-use super::{furniture, objects, plants, reliefs, seating, tableware, textures};
+use super::{furniture, objects, plants, seating, tableware};
 use crate::scene::{AlphaMode, Material, Scene};
 
 /// Width, height and depth of the sideboard.
@@ -37,13 +37,9 @@ pub(super) fn build() -> Scene {
 
 /// Wood and plaster, with normal maps.
 fn room(b: &mut Builder) {
-    let size = Vec2::new(1.4, 0.7);
-    let oak = b.texture(textures::timber([0.42, 0.27, 0.145]), size);
-    let grain = b.data(reliefs::timber(size), size);
+    let ([oak], grain) = materials::timber(b, [[0.42, 0.27, 0.145]]);
     let oak = b.material(embossed(varnished(textured("oak", oak, 0.55), 0.3, 0.25), grain));
-    let size = Vec2::splat(1.6);
-    let plaster = b.texture(textures::plaster([0.20, 0.29, 0.30], 0.22), size);
-    let trowel = b.data(reliefs::plaster(size), size);
+    let ([plaster], trowel) = materials::plaster(b, 1.6, [([0.20, 0.29, 0.30], 0.22)]);
     let wall = b.material(embossed(textured("plaster", plaster, 0.8), trowel));
     let floor = b.material(matte("floor", [0.30, 0.21, 0.13], 0.5));
     let brass = b.material(materials::brass());
@@ -118,17 +114,12 @@ fn metals(b: &mut Builder) {
 
 /// Thin and solid glass.
 fn glasses(b: &mut Builder) {
-    let solid = |name: &str, roughness: f32| Material {
-        transmission: 1.0,
-        thickness: 0.1,
-        ..matte(name, [1.0; 3], roughness)
-    };
     let clear = b.material(glass("glass", [0.96, 0.98, 0.97]));
     let drink = b.material(Material {
         ior: 1.33,
         attenuation_color: Vec3::new(0.88, 0.42, 0.06),
         attenuation_distance: 0.16,
-        ..solid("elderflower", 0.0)
+        ..materials::solid_glass("elderflower", 0.0)
     });
     let bubble = b.material(Material {
         iridescence: 1.0,
@@ -141,9 +132,10 @@ fn glasses(b: &mut Builder) {
     let pebble = b.material(Material {
         attenuation_color: Vec3::new(0.25, 0.70, 0.50),
         attenuation_distance: 0.03,
-        ..solid("sea glass", 0.3)
+        ..materials::solid_glass("sea glass", 0.3)
     });
-    let flint = b.material(Material { ior: 1.8, dispersion: 4.0, ..solid("flint glass", 0.0) });
+    let flint = materials::solid_glass("flint glass", 0.0);
+    let flint = b.material(Material { ior: 1.8, dispersion: 4.0, ..flint });
     b.standing([0.10, 0.0, -0.11], 0.0, |b| tableware::carafe(b, clear, drink, 0.32));
     b.standing([-0.60, 0.0, -0.10], 0.0, |b| {
         let shape = [
@@ -186,9 +178,7 @@ fn glasses(b: &mut Builder) {
 
 /// Velvet, and mother of pearl upon it.
 fn cloths(b: &mut Builder) {
-    let size = Vec2::splat(0.10);
-    let weave = b.texture(textures::weave([0.30, 0.035, 0.10], 40), size);
-    let threads = b.data(reliefs::weave(size, 40), size);
+    let ([weave], threads) = materials::weave(b, 0.10, 40, [[0.30, 0.035, 0.10]]);
     let velvet = b.material(Material {
         sheen_color: Vec3::new(0.75, 0.45, 0.55),
         sheen_roughness: 0.35,
