@@ -1,7 +1,7 @@
 //! Tests of builtin.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 use glam::{Vec2, Vec3};
@@ -139,7 +139,7 @@ fn uniform_direction(stream: &mut Stream) -> Vec3 {
     Vec3::new(ring * c, y, ring * s)
 }
 
-/// Rays from inside a room may leave only through its openings; gives the share that leaves.
+/// Rays from inside a room, which no glass stops, may leave only through its openings; gives the share that leaves.
 fn escaping(name: &str, size: [f32; 3], rays: u32, through: impl Fn(Vec3) -> bool) -> f32 {
     let scene = builtin::build(name).expect(name);
     let bvh = Bvh::build(&scene.positions, &scene.triangles);
@@ -153,7 +153,11 @@ fn escaping(name: &str, size: [f32; 3], rays: u32, through: impl Fn(Vec3) -> boo
         );
         let direction = uniform_direction(&mut stream);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-        if bvh.closest_hit(&ray, |_| true).is_none() {
+        let is_opaque = |triangle: u32| {
+            let material = scene.triangle_materials[triangle as usize];
+            scene.materials[material as usize].transmission == 0.0
+        };
+        if bvh.closest_hit(&ray, |hit| is_opaque(hit.triangle)).is_none() {
             left += 1;
             // Where the ray meets the inner face of the wall it left through.
             let half = Vec3::new(0.5 * size[0], 0.5 * size[1], 0.5 * size[2]);
@@ -179,8 +183,41 @@ fn rooms_leak_only_through_their_openings() {
     let crack = escaping("crack", [4.0, 2.5, 3.0], 100_000, |p| {
         p.x < -1.99 && within(p.y, 1.59, 1.63) && p.z.abs() < 0.76
     });
-    eprintln!("escaping: office {office}, living-room {living}, crack {crack}");
+    let bathroom = escaping("bathroom", [4.4, 2.7, 3.2], 100_000, |p| {
+        p.x > 2.19 && within(p.y, 0.91, 2.33) && within(p.z, -0.19, 1.27)
+    });
+    eprintln!(
+        "escaping: office {office}, living-room {living}, crack {crack}, bathroom {bathroom}"
+    );
     assert!(within(office, 0.004, 0.04) && within(living, 0.02, 0.12) && crack < 0.002);
+    assert!(within(bathroom, 0.01, 0.10));
+}
+
+/// Across each edge of solid glass lies another face of it, wound the same way.
+#[test]
+fn solid_glass_is_closed() {
+    for name in builtin::names() {
+        let scene = builtin::build(name).expect(name);
+        let mut edges: Vec<(u32, [Vec3; 2])> = Vec::new();
+        for (t, &m) in scene.triangle_materials.iter().enumerate() {
+            let material = &scene.materials[m as usize];
+            if material.transmission > 0.0 && material.thickness > 0.0 {
+                let [a, b, c] = corners(&scene, t);
+                edges.extend([[a, b], [b, c], [c, a]].map(|edge| (m, edge)));
+            }
+        }
+        assert!(name != &"bathroom" || edges.len() > 1000);
+        let key = |m: u32, edge: [Vec3; 2]| (m, edge.map(|p| p.to_array().map(f32::to_bits)));
+        let known: HashSet<_> = edges.iter().map(|&(m, edge)| key(m, edge)).collect();
+        edges.retain(|&(m, [from, to])| !known.contains(&key(m, [to, from])));
+        // Of these the corners on both sides differ by rounding.
+        for (m, [from, to]) in &edges {
+            let is_met = edges.iter().any(|(other, [start, end])| {
+                m == other && start.distance(*to) < 1e-5 && end.distance(*from) < 1e-5
+            });
+            assert!(is_met, "{name}: {} is open at {from}", scene.materials[*m as usize].name);
+        }
+    }
 }
 
 #[test]

@@ -78,6 +78,27 @@ pub(super) fn pendant(
     b.ball(bulb, Vec3::Y * (0.25 * radius - drop), 0.05);
 }
 
+/// A lamp in a wall's frame: a bulb on an arm in a shell of `radius`, whose wall is solid glass.
+pub(super) fn globe_lamp(b: &mut Builder, metal: Mat, [glass, bulb]: [Mat; 2], radius: f32) {
+    let (neck, arm) = (0.12 * PI, Vec3::Z * (radius + 0.05));
+    b.rod(metal, Vec3::Z * -0.005, Vec3::Z * 0.018, 0.05);
+    b.rod(metal, Vec3::Z * 0.01, arm, 0.008);
+    b.moved(arm, |b| {
+        let middle = 0.025 + radius * neck.cos();
+        b.drum(metal, [-0.02, 0.032], [0.02, 0.046], 0.003);
+        b.rod(metal, Vec3::ZERO, Vec3::Y * (middle - 0.25 * radius), 0.008);
+        b.ball(bulb, Vec3::Y * middle, 0.32 * radius);
+        let at = |r: f32, k: i32| {
+            let (s, c) = (neck + (PI - neck) * k as f32 / 32.0).sin_cos();
+            (r * s.max(0.0), middle - r * c)
+        };
+        let mut profile: Vec<_> = (0..=32).map(|k| at(radius, k)).collect();
+        profile.extend((0..=32).rev().map(|k| at(radius - 0.004, k)));
+        profile.push(at(radius, 0));
+        b.lathe(glass, 64, &profile);
+    });
+}
+
 /// A jointed desk lamp that bows towards +Z.
 pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
     b.drum(metal, [0.0, 0.022], [0.085, 0.080], 0.006);
