@@ -101,7 +101,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6646),
     ("report", 2918),
     ("sampler", 144),
-    ("scene", 9674),
+    ("scene", 9836),
     ("shaders", 6312),
     ("sources", 133),
     ("stability", 1763),
