@@ -1,6 +1,6 @@
-// Paths that aim at translucent surfaces: twin of src/path/translucent.rs and src/path/aim.rs. From word
-// `globals.translucent_at` on, `lights` holds the triangles (ascending) and the node of each in `light_nodes`, where
-// their tree begins at node `globals.translucent_root`.
+// Paths that aim at surfaces: twin of src/path/aim_targets.rs and src/path/aim.rs. From word
+// `globals.targets_at` on, `lights` holds the triangles (ascending) and the node of each in `light_nodes`, where
+// their tree begins at node `globals.targets_root`.
 
 // What `Path::aim` is where the ray may not have been aimed, and where it may have been, but was not. Otherwise it is
 // the triangle and 2.
@@ -11,7 +11,7 @@ fn is_aimed(path: ptr<function, Path>) -> bool {
     return (*path).aim > FREE_AIM;
 }
 
-// Twin of `PathTracer::translucent_for`: whether the path may aim from there.
+// Twin of `PathTracer::aiming_from`: whether the path may aim from there.
 fn may_aim(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if MEDIUM
     if vertex.is_in_medium {
@@ -22,7 +22,7 @@ fn may_aim(path: ptr<function, Path>, vertex: Vertex) -> bool {
 }
 
 // Where the path goes on, by a number for the lobe, one that decides whether it aims, and two more: twin of
-// `TranslucentSurfaces::onward`.
+// `Aiming::onward`.
 fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits: vec2u) -> BsdfSample {
     let u = vec2f(unit_from_bits(bits.x), unit_from_bits(bits.y));
     let may_aim_ = may_aim(path, vertex);
@@ -31,8 +31,8 @@ fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits:
     if may_aim_ && choice.y < globals.aim_probability {
         let receiver = receiver_of(vertex);
         var draw = draw_new(bits.x);
-        let light = descend_lights(globals.translucent_root, receiver, &draw);
-        let triangle = lights(globals.translucent_at + light).x;
+        let light = descend_lights(globals.targets_root, receiver, &draw);
+        let triangle = lights(globals.targets_at + light).x;
         let barycentric = barycentric_of(vec2f(draw_remainder(draw), u.y));
         let target_ = place_on(light_corners(triangle), barycentric);
         // From where the ray begins, or it would miss small triangles.
@@ -53,13 +53,13 @@ fn sample_aiming(path: ptr<function, Path>, vertex: Vertex, choice: vec2f, bits:
 }
 
 // Density in solid angle of arriving at a place of a triangle, some metres away, from where the BSDF has that of
-// `bsdf_pdf`: twin of `TranslucentSurfaces::pdf_solid_angle`.
+// `bsdf_pdf`: twin of `Aiming::pdf_solid_angle`.
 fn aiming_pdf(receiver: Receiver, triangle: u32, direction: vec3f, distance: f32, bsdf_pdf: f32) -> f32 {
     var pdf = (1.0 - globals.aim_probability) * bsdf_pdf;
-    let index = index_of_triangle(globals.translucent_at, globals.translucent_count, triangle);
-    if index < globals.translucent_count {
-        let leaf = lights(globals.translucent_at + globals.translucent_count + index).x;
-        let root = globals.translucent_root;
+    let index = index_of_triangle(globals.targets_at, globals.target_count, triangle);
+    if index < globals.target_count {
+        let leaf = lights(globals.targets_at + globals.target_count + index).x;
+        let root = globals.targets_root;
         let chosen = interval_probability(choose_leaf(root, leaf, whole_interval(), receiver));
         let density = area_to_solid_angle(light_corners(triangle), direction, distance * distance);
         pdf += globals.aim_probability * chosen * density;

@@ -97,11 +97,11 @@ struct Globals {
     // Number of the first triangle of instances, and of how many numbers a slot has the logarithm.
     first_of_instances: u32,
     slot_log2: u32,
-    // Translucent surfaces: word of `lights` at which they begin, their number, their tree's root in `light_nodes`, and
-    // the probability of aiming at them.
-    translucent_at: u32,
-    translucent_count: u32,
-    translucent_root: u32,
+    // What paths aim at: word of `lights` at which its triangles begin, their number, their tree's root in
+    // `light_nodes`, and the probability of aiming at them.
+    targets_at: u32,
+    target_count: u32,
+    targets_root: u32,
     aim_probability: f32,
     padding_0: u32,
     padding_1: u32,

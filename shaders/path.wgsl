@@ -14,7 +14,7 @@ struct Path {
     departure_receiver: Receiver,
 //#end
 //#if AIMING
-    // Whether the ray was aimed at a translucent surface; see aim.wgsl.
+    // Whether the ray was aimed; see aim.wgsl.
     aim: u32,
 //#end
 //#if CLEAR_SOLIDS

@@ -1,4 +1,4 @@
-//! Paths that aim at translucent surfaces: which ones, from where, and what they weigh where they arrive.
+//! Paths that aim: how bright their targets are, from where they aim, and what they weigh where they arrive.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::aim_targets::{AimTargets, Aiming, Facet};
 use super::tracer::{Departure, Path, PathTracer};
-use super::translucent::{Facet, TranslucentSurfaces};
 use super::triangles::point_on;
 use super::vertex::{Aim, Scatterer, Vertex};
 use crate::bsdf::cosine_hemisphere;
@@ -76,10 +76,10 @@ fn radiance_of_part(
 }
 
 impl PathTracer<'_> {
-    /// Translucent surfaces of the scene, weighed by the light that is found on them; `None` if there are none.
-    pub(crate) fn translucent_surfaces(&self) -> Option<TranslucentSurfaces> {
+    /// What paths may aim at in the scene, weighed by the light that is found on it; `None` if there is nothing.
+    pub(crate) fn aim_targets(&self) -> Option<AimTargets> {
         let scene = &self.world.scene;
-        let facets = TranslucentSurfaces::facets(scene);
+        let facets = AimTargets::facets(scene);
         if facets.is_empty() {
             return None;
         }
@@ -95,41 +95,41 @@ impl PathTracer<'_> {
             [0, 1].map(|side| all[side] + (1.0 - SHARE_OF_ALL) * mean(parts, side))
         };
         let radiances: Vec<[f32; 2]> = spans.iter().map(of_facet).collect();
-        Some(TranslucentSurfaces::new(scene, &facets, &radiances))
+        Some(AimTargets::new(scene, &facets, &radiances))
     }
 
     /// Luminance that a camera path brings back from the first surface that may aim: what of it comes straight from
-    /// translucent ones, and all.
-    pub(crate) fn light_of_translucent(&self, ray: Ray, sampler: Sampler) -> [f32; 2] {
+    /// targets, and all.
+    pub(crate) fn light_of_targets(&self, ray: Ray, sampler: Sampler) -> [f32; 2] {
         let mut path = Path::new(self, ray, sampler);
         let (mut of_first, mut of_second) = (None, None);
         let Some(first) = path.next_vertex(&mut of_first) else { return [0.0; 2] };
         path.radiance = Vec3::ZERO;
-        let Some(translucent) = self.translucent_for(&first) else { return [0.0; 2] };
-        let mut from_translucent = 0.0;
+        let Some(aiming) = self.aiming_from(&first) else { return [0.0; 2] };
+        let mut from_targets = 0.0;
         if path.visit(&first) {
             let before = path.radiance;
             let second = path.next_vertex(&mut of_second);
-            let is_translucent = second.as_ref().is_some_and(|vertex| translucent.has(vertex));
+            let is_target = second.as_ref().is_some_and(|vertex| aiming.targets.has(vertex));
             if let Some(second) = second
                 && path.visit(&second)
             {
                 path.run();
             }
-            if is_translucent {
-                from_translucent = luminance(path.radiance - before);
+            if is_target {
+                from_targets = luminance(path.radiance - before);
             }
         }
-        [from_translucent, luminance(path.radiance)]
+        [from_targets, luminance(path.radiance)]
     }
 }
 
 impl<'a> PathTracer<'a> {
-    /// What a path in air may aim at from a vertex.
-    pub(super) fn translucent_for(&self, vertex: &Vertex<'_>) -> Option<&'a TranslucentSurfaces> {
-        let translucent = self.lights.translucent.as_deref()?;
+    /// How a path in air aims from a vertex; `None` if it does not.
+    pub(super) fn aiming_from(&self, vertex: &Vertex<'_>) -> Option<&'a Aiming> {
+        let aiming = self.lights.aiming.as_ref()?;
         let Scatterer::Surface(surface) = &vertex.scatterer else { return None };
-        surface.is_cacheable().then_some(translucent)
+        surface.is_cacheable().then_some(aiming)
     }
 }
 
@@ -149,20 +149,20 @@ impl Departure {
             return None;
         }
         let bsdf_pdf = self.pdf_solid_angle;
-        let translucent = tracer.lights.translucent.as_deref();
-        let Some(translucent) = translucent.filter(|_| bsdf_pdf.is_finite()) else {
+        let aiming = tracer.lights.aiming.as_ref();
+        let Some(aiming) = aiming.filter(|_| bsdf_pdf.is_finite()) else {
             return Some(1.0);
         };
         let at = (point.triangle, self.receiver.position.distance(point.position));
         let (scene, direction) = (&tracer.world.scene, self.ray.direction);
-        let pdf = translucent.pdf_solid_angle(scene, at, &self.receiver, direction, bsdf_pdf);
-        Some(translucent.probability_of_bsdf() * bsdf_pdf / pdf)
+        let pdf = aiming.pdf_solid_angle(scene, at, &self.receiver, direction, bsdf_pdf);
+        Some(aiming.probability_of_bsdf() * bsdf_pdf / pdf)
     }
 
     /// Probability with which the BSDF chose the direction of the ray, which may have been aimed.
     pub(super) fn probability_of_bsdf(&self, tracer: &PathTracer<'_>) -> f32 {
-        let translucent = tracer.lights.translucent.as_deref();
         let may_aim = self.aim != Aim::None;
-        translucent.filter(|_| may_aim).map_or(1.0, TranslucentSurfaces::probability_of_bsdf)
+        let aiming = tracer.lights.aiming.as_ref().filter(|_| may_aim);
+        aiming.map_or(1.0, Aiming::probability_of_bsdf)
     }
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+use super::aim_targets::Aiming;
 use super::light_tree::{Light, LightTree, Moments, Receiver};
-use super::translucent::TranslucentSurfaces;
 use super::triangles::{area_to_solid_angle, facing, point_on, relate, solid_angle_pdf};
 use crate::bsdf;
 use crate::bvh::Hit;
@@ -40,8 +40,8 @@ pub struct LocalLights {
     pub(crate) punctual: Vec<PunctualLight>,
     /// How lights are chosen.
     pub(crate) tree: LightTree,
-    /// Surfaces that paths aim at beside them; `None` where that gains nothing.
-    pub(crate) translucent: Option<Box<TranslucentSurfaces>>,
+    /// How paths aim at surfaces beside them; `None` where that gains nothing.
+    pub(crate) aiming: Option<Aiming>,
 }
 
 /// Which lights inside a scene count, and how much.
@@ -114,7 +114,7 @@ impl LocalLights {
         }
         relate(&mut lights);
         let tree = LightTree::new(lights, total, &distant, triangles.len());
-        Self { triangles, punctual, tree, translucent: None }
+        Self { triangles, punctual, tree, aiming: None }
     }
 
     /// Whether there is nothing to sample.

@@ -9,6 +9,7 @@
 //! the same light behind a pane. Smooth solid glass refracts both (`shadows`).
 
 mod aim;
+pub(crate) mod aim_targets;
 pub mod background;
 mod body;
 pub(crate) mod cached;
@@ -20,6 +21,7 @@ mod learn;
 pub(crate) mod light_tree;
 mod lights;
 pub(crate) mod limits;
+pub(crate) mod lit_targets;
 mod looks;
 mod materials;
 mod ray_clock;
@@ -28,7 +30,6 @@ pub mod sharing;
 pub(crate) mod splitting;
 mod tracer;
 pub(crate) mod train;
-pub(crate) mod translucent;
 mod triangles;
 mod vertex;
 mod world;

@@ -19,10 +19,10 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::aim_targets::Aiming;
 use super::shadows::SHADOW_RAY_SHARE;
 use super::splitting::{MIN_SHARED_ALPHA, MIN_WHOLE_ALPHA, UseOfVertices};
 use super::tracer::{Path, PathResult, PathTracer};
-use super::translucent::TranslucentSurfaces;
 use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
@@ -94,8 +94,8 @@ pub(crate) const TILE_SEED: u32 = 0x7469_6c65;
 struct First<'v> {
     vertex: Vertex<'v>,
     throughput: Vec3,
-    /// What its pixel may have aimed at.
-    translucent: Option<&'v TranslucentSurfaces>,
+    /// How its pixel may have aimed.
+    aiming: Option<&'v Aiming>,
 }
 
 /// A second vertex that is shared.
@@ -142,7 +142,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
             } else {
                 path.use_of_vertices = UseOfVertices::alone(start.tracer.cache.is_some());
             }
-            let (throughput, translucent) = (path.throughput, path.tracer.translucent_for(&vertex));
+            let (throughput, aiming) = (path.throughput, path.tracer.aiming_from(&vertex));
             if path.visit(&vertex)
                 && let is_lifted = vertex.scatterer.lifts(path.ray.direction)
                 && let Some(second) = path.next_vertex(second_bsdf)
@@ -155,7 +155,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
                     seconds.push(Second { owner, vertex: second, path: path.clone() });
                 }
             }
-            first = shares.then_some(First { vertex, throughput, translucent });
+            first = shares.then_some(First { vertex, throughput, aiming });
         }
         results.push(path.result());
         firsts.push(first);
@@ -375,15 +375,15 @@ impl Second<'_, '_> {
             }
             let scattered = first.vertex.scatterer.scattered(direction);
             let Some((f, pdf_solid_angle)) = scattered else { continue };
-            let pdf_solid_angle = match (first.translucent, scatterer) {
-                (Some(translucent), Scatterer::Surface(surface)) => {
+            let pdf_solid_angle = match (first.aiming, scatterer) {
+                (Some(aiming), Scatterer::Surface(surface)) => {
                     let at = (surface.triangle, distance);
                     let receiver = first.vertex.receiver();
                     let scene = &tracer.world.scene;
-                    translucent.pdf_solid_angle(scene, at, &receiver, direction, pdf_solid_angle)
+                    aiming.pdf_solid_angle(scene, at, &receiver, direction, pdf_solid_angle)
                 }
-                (Some(translucent), Scatterer::Medium(_)) => {
-                    translucent.probability_of_bsdf() * pdf_solid_angle
+                (Some(aiming), Scatterer::Medium(_)) => {
+                    aiming.probability_of_bsdf() * pdf_solid_angle
                 }
                 (None, _) => pdf_solid_angle,
             };

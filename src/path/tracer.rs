@@ -121,7 +121,7 @@ pub(super) struct Departure {
     pub(super) map_samples: u32,
     /// Whether smooth glass has refracted it since.
     pub(super) is_refracted: bool,
-    /// Whether the ray was aimed at a translucent surface.
+    /// Whether the ray was aimed.
     pub(super) aim: Aim,
 }
 
@@ -535,12 +535,12 @@ impl<'a> Path<'a> {
     pub(super) fn choose_onward(&mut self, vertex: &Vertex<'_>) -> Option<Onward> {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => {
-                let translucent = self.tracer.translucent_for(vertex);
-                if let Some(translucent) = translucent.filter(|_| self.is_in_air()) {
+                let aiming = self.tracer.aiming_from(vertex);
+                if let Some(aiming) = aiming.filter(|_| self.is_in_air()) {
                     let choice = self.sampler.next_pair();
                     let bits = self.sampler.next_pair_bits();
                     let scene = &self.tracer.world.scene;
-                    return translucent.onward(scene, vertex, surface, choice, bits);
+                    return aiming.onward(scene, vertex, surface, choice, bits);
                 }
                 let lobe = if surface.bsdf().is_lambert {
                     self.sampler.skip(1);

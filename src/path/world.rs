@@ -5,6 +5,7 @@ use glam::Vec3;
 use std::sync::Arc;
 
 use super::lights::{LightChoice, LocalLights};
+use super::lit_targets::LitTargets;
 use super::materials::{Passing, ReadyMaterial};
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray, Shared};
@@ -29,6 +30,8 @@ pub struct World {
     pub bvh: Bvh,
     /// Emissive triangles and punctual lights.
     pub lights: LocalLights,
+    /// What paths may aim at.
+    pub(crate) targets: LitTargets,
     materials: Vec<ReadyMaterial>,
     /// The same one in all worlds of the same geometry.
     pub(crate) geometry: Arc<()>,
@@ -48,7 +51,8 @@ impl World {
     fn of_geometry(scene: Scene, bvh: Bvh, geometry: Arc<()>) -> Self {
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds(), &LightChoice::All);
-        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, geometry, clock: None }
+        let (needs, targets) = (SceneNeeds::of(&scene), LitTargets::default());
+        Self { needs, scene, bvh, lights, targets, materials, geometry, clock: None }
     }
 
     /// The same scene with other materials, as many as it has, and other lights.

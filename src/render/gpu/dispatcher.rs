@@ -103,7 +103,7 @@ impl Dispatcher {
         let Some(lights) = lights else { return Ok(()) };
         let Self { buffers, globals, features, .. } = self;
         features.view.set(ViewFeatures::LOCAL_LIGHTS, !lights.is_empty());
-        features.view.set(ViewFeatures::AIMING, lights.translucent.is_some());
+        features.view.set(ViewFeatures::AIMING, lights.aiming.is_some());
         if features.scene_lights() {
             put_lights(buffers, globals, lights)?;
         }

@@ -45,7 +45,7 @@ bitflags::bitflags! {
         const RECORD_RATIO = 1 << 13;
         /// The share is weighted by the cosine.
         const RECORD_COSINE = 1 << 14;
-        /// Paths aim at translucent surfaces.
+        /// Paths aim at surfaces.
         const AIMING = 1 << 15;
     }
 }
@@ -267,7 +267,7 @@ impl Features {
         self.area_sources() || self.scene.contains(SceneFeatures::PUNCTUAL_LIGHTS)
     }
 
-    /// Triangles are chosen as lamps are: emissive or translucent ones.
+    /// Triangles are chosen as lamps are: emissive ones or what paths aim at.
     pub(super) fn area_sources(&self) -> bool {
         self.scene.contains(SceneFeatures::EMITTERS) || self.view.contains(ViewFeatures::AIMING)
     }

@@ -11,6 +11,7 @@ use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
 use crate::medium::{Fog, Phase};
+use crate::path::aim_targets::Aiming;
 use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
 use crate::path::light_tree::Node;
@@ -101,9 +102,9 @@ pub(crate) struct Globals {
     pub(crate) cache_least_distance: f32,
     pub(crate) first_of_instances: u32,
     pub(crate) slot_log2: u32,
-    pub(crate) translucent_at: u32,
-    pub(crate) translucent_count: u32,
-    pub(crate) translucent_root: u32,
+    pub(crate) targets_at: u32,
+    pub(crate) target_count: u32,
+    pub(crate) targets_root: u32,
     pub(crate) aim_probability: f32,
     pub(crate) padding_0: u32,
     pub(crate) padding_1: u32,
@@ -413,7 +414,7 @@ pub(super) const PUNCTUAL_WORDS: usize = 16;
 
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u32> {
-    let LocalLights { triangles, punctual, tree, translucent } = lights;
+    let LocalLights { triangles, punctual, tree, aiming } = lights;
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;
     let mut words = [triangles.as_slice(), &tree.leaves].concat();
@@ -435,23 +436,23 @@ pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u3
         }
         words.extend(record);
     }
-    globals.translucent_at = words.len() as u32;
-    if let Some(translucent) = translucent {
-        globals.translucent_count = translucent.triangles.len() as u32;
-        globals.translucent_root = tree.nodes.len() as u32;
-        globals.aim_probability = translucent.aim_probability;
-        words.extend(&translucent.triangles);
-        words.extend(translucent.tree.leaves.iter().map(|leaf| leaf + globals.translucent_root));
+    globals.targets_at = words.len() as u32;
+    if let Some(Aiming { targets, probability }) = aiming {
+        globals.target_count = targets.triangles.len() as u32;
+        globals.targets_root = tree.nodes.len() as u32;
+        globals.aim_probability = *probability;
+        words.extend(&targets.triangles);
+        words.extend(targets.tree.leaves.iter().map(|leaf| leaf + globals.targets_root));
     }
     words
 }
 
-/// Nodes of the lights' tree, and of that of translucent surfaces behind it.
+/// Nodes of the lights' tree, and of that of aim targets behind it.
 pub(crate) fn light_nodes(lights: &LocalLights) -> Vec<Node> {
     let mut nodes = lights.tree.nodes.clone();
     let root = nodes.len() as u32;
-    if let Some(translucent) = &lights.translucent {
-        nodes.extend(translucent.tree.nodes.iter().map(|node| node.moved(root)));
+    if let Some(Aiming { targets, .. }) = &lights.aiming {
+        nodes.extend(targets.tree.nodes.iter().map(|node| node.moved(root)));
     }
     nodes
 }

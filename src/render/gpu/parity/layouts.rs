@@ -91,7 +91,7 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         fog_low fog_mean_cosine fog_high tries_per_vertex fog_scattering importance_scale fog_extinction
         first_of_sequence background background_concentration film_scale opaque_triangles cache_is_known
         cache_scale cache_center cache_edge cache_mean cache_least_distance first_of_instances slot_log2
-        translucent_at translucent_count translucent_root aim_probability padding_0 padding_1);
+        targets_at target_count targets_root aim_probability padding_0 padding_1);
     assert_same(&module, "Globals", globals);
     let ray = fields!(CastRay: origin t_max direction padding);
     assert_same(&module_of(Kernel::ClosestHits), "CastRay", ray);

@@ -1,14 +1,18 @@
-//! Surfaces through which light comes scattered: frosted panes, cloth, lampshades.
+//! What paths aim at: surfaces that throw light which hardly any ray towards a light finds. Light comes scattered through
+//! frosted panes, cloth and lampshades; metals throw that of the sun and of lamps onto what is around them (caustics).
 //!
-//! No ray towards a light gets through them, so a path finds their light only where its BSDF's sample happens to meet
-//! them. A path therefore aims at them with a probability `a`: it chooses one of their triangles by a light tree, as
-//! if they were lamps, and a point on it. Where a ray arrives at such a triangle, both ways may have led there, and
-//! the path is weighed by the sum of their densities, `(1 - a) p_bsdf + a p_aim` (one-sample balance heuristic: Veach
-//! and Guibas, *Optimally Combining Sampling Techniques for Monte Carlo Rendering*, SIGGRAPH 1995). A ray that was
-//! aimed ends with nothing if something else is in the way.
+//! A path finds that light only where its BSDF's sample happens to meet such a surface. A path therefore aims at them
+//! with a probability `a`: it chooses one of their triangles by a light tree, as if they were lamps, and a point on it.
+//! Where a ray arrives at such a triangle, both ways may have led there, and the path is weighed by the sum of their
+//! densities, `(1 - a) p_bsdf + a p_aim` (one-sample balance heuristic: Veach and Guibas, *Optimally Combining Sampling
+//! Techniques for Monte Carlo Rendering*, SIGGRAPH 1995). A ray that was aimed ends with nothing if something else is
+//! in the way.
 //!
 //! How bright each triangle is for the tree, a few paths say that look at it from either side. How much of the light
 //! that the camera sees comes from them decides `a`, and whether there is anything to aim at.
+
+use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -16,19 +20,28 @@ use super::light_tree::{Light, LightTree, Moments, Receiver};
 use super::triangles::{facing, point_on, relate, solid_angle_pdf};
 use super::vertex::{Aim, Onward, Scatterer, SurfaceScatterer, Vertex};
 use crate::sampler::unit_from_bits;
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Scene, TextureSlot};
 
-/// Most triangles that paths aim at: the tree is made for each picture.
+/// Most triangles that paths aim at.
 const MAX_TRIANGLES: usize = 1 << 15;
+/// Roughness of metals that are aimed at. NEE finds little on smoother ones, and the light of rougher ones is found
+/// without.
+const METALS: Range<f32> = 0.05..0.6;
 
-/// Translucent triangles, and how paths choose among them.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct TranslucentSurfaces {
+/// Triangles that paths aim at, and how one is chosen.
+#[derive(Debug, Default)]
+pub(crate) struct AimTargets {
     /// Ascending.
     pub(crate) triangles: Vec<u32>,
     pub(crate) tree: LightTree,
+}
+
+/// How paths aim.
+#[derive(Debug, Clone)]
+pub(crate) struct Aiming {
+    pub(crate) targets: Arc<AimTargets>,
     /// Probability of aiming at one of them.
-    pub(crate) aim_probability: f32,
+    pub(crate) probability: f32,
 }
 
 /// Whether light comes through it scattered.
@@ -37,17 +50,34 @@ fn is_translucent(material: &Material) -> bool {
     (is_frosted || material.diffuse_transmission > 0.0) && !material.unlit
 }
 
-/// A translucent triangle.
+/// Whether it is a metal that is neither smooth nor dull.
+fn is_polished_metal(material: &Material) -> bool {
+    let is_textured = material.texture(TextureSlot::MetallicRoughness).is_some();
+    let is_metal = material.metallic > 0.5 && METALS.contains(&material.roughness);
+    is_metal && !is_textured && !material.unlit
+}
+
+/// A triangle that paths may aim at.
 pub(super) struct Facet {
     pub(super) triangle: u32,
     /// Its normal times its area in square metres.
     pub(super) area: Vec3,
 }
 
-impl TranslucentSurfaces {
-    /// Triangles of a scene that let light through scattered; none if there are too many.
+impl AimTargets {
+    /// Triangles of a scene that paths may aim at; without metals if they are too many, none if the others are.
     pub(super) fn facets(scene: &Scene) -> Vec<Facet> {
-        let chosen: Vec<bool> = scene.materials.iter().map(is_translucent).collect();
+        let is_target =
+            |material: &Material| is_translucent(material) || is_polished_metal(material);
+        let few = |facets: &Vec<Facet>| facets.len() <= MAX_TRIANGLES;
+        let all = Some(Self::facets_of(scene, is_target)).filter(few);
+        let but_metals = || Some(Self::facets_of(scene, is_translucent)).filter(few);
+        all.or_else(but_metals).unwrap_or_default()
+    }
+
+    /// Triangles of such materials, or one more than may be.
+    fn facets_of(scene: &Scene, is_target: impl Fn(&Material) -> bool) -> Vec<Facet> {
+        let chosen: Vec<bool> = scene.materials.iter().map(is_target).collect();
         if !chosen.contains(&true) {
             return Vec::new();
         }
@@ -57,9 +87,7 @@ impl TranslucentSurfaces {
             let area = 0.5 * (b - a).cross(c - a);
             (area.length() > 0.0).then_some(Facet { triangle, area })
         };
-        let facets = scene.own_triangles().filter_map(facet).take(MAX_TRIANGLES + 1);
-        let facets: Vec<Facet> = facets.collect();
-        if facets.len() > MAX_TRIANGLES { Vec::new() } else { facets }
+        scene.own_triangles().filter_map(facet).take(MAX_TRIANGLES + 1).collect()
     }
 
     /// Of facets with the brightness of radiance that leaves their fronts and backs.
@@ -75,7 +103,7 @@ impl TranslucentSurfaces {
         relate(&mut lights);
         let triangles: Vec<u32> = facets.iter().map(|facet| facet.triangle).collect();
         let tree = LightTree::new(lights, 1.0, &[], triangles.len());
-        Self { triangles, tree, aim_probability: 0.5 }
+        Self { triangles, tree }
     }
 
     /// Chooses a point as seen from a place: its triangle and itself.
@@ -93,7 +121,9 @@ impl TranslucentSurfaces {
             Scatterer::Surface(surface) if self.triangles.binary_search(&surface.triangle).is_ok()
         )
     }
+}
 
+impl Aiming {
     /// Density in solid angle with which a path arrives at a place of `triangle`, `distance` metres away along unit
     /// `direction`, from where the BSDF has that of `bsdf_pdf`.
     pub(super) fn pdf_solid_angle(
@@ -105,13 +135,14 @@ impl TranslucentSurfaces {
         bsdf_pdf: f32,
     ) -> f32 {
         let way = (direction, distance);
-        let aimed = solid_angle_pdf((&self.triangles, &self.tree), scene, triangle, receiver, way);
-        (1.0 - self.aim_probability) * bsdf_pdf + self.aim_probability * aimed
+        let AimTargets { triangles, tree } = &*self.targets;
+        let aimed = solid_angle_pdf((triangles, tree), scene, triangle, receiver, way);
+        (1.0 - self.probability) * bsdf_pdf + self.probability * aimed
     }
 
     /// Probability with which the BSDF chooses the direction.
     pub(super) fn probability_of_bsdf(&self) -> f32 {
-        1.0 - self.aim_probability
+        1.0 - self.probability
     }
 
     /// Where a path goes on from a vertex by a number for the lobe, one that decides whether it aims, and two more.
@@ -124,12 +155,12 @@ impl TranslucentSurfaces {
         bits: [u32; 2],
     ) -> Option<Onward> {
         let weight = 1.0 / self.probability_of_bsdf();
-        if aim >= self.aim_probability {
+        if aim >= self.probability {
             let [x, y] = bits.map(unit_from_bits);
             let onward = surface.onward(Vec3::new(lobe, x, y))?;
             return Some(Onward { weight: onward.weight * weight, aim: Aim::Free, ..onward });
         }
-        let (triangle, target) = self.sample(scene, &vertex.receiver(), bits);
+        let (triangle, target) = self.targets.sample(scene, &vertex.receiver(), bits);
         // From where the ray begins, or it would miss small triangles.
         let origin = surface.sides.origin_toward(vertex.position, target - vertex.position);
         let direction = (target - origin).normalize();
