@@ -52,13 +52,13 @@ pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Mater
     matte(name, [1.0; 3], roughness).with_texture(TextureSlot::BaseColor, texture)
 }
 
-/// Timber of some tones for furniture, grain along u.
+/// Timber of each tone for furniture, grain along u.
 pub(super) fn timber<const N: usize>(b: &mut Builder, tones: [[f32; 3]; N]) -> Embossed<N> {
     let size = Vec2::new(1.4, 0.7);
     (tones.map(|tone| b.texture(textures::timber(tone), size)), b.data(reliefs::timber(size), size))
 }
 
-/// Plaster of some tones and of the strengths of their clouds, which repeats after so many `metres`.
+/// Plaster that repeats every `metres`; each tone has the strength of its clouds.
 pub(super) fn plaster<const N: usize>(
     b: &mut Builder,
     metres: f32,
@@ -69,7 +69,7 @@ pub(super) fn plaster<const N: usize>(
     (colors, b.data(reliefs::plaster(size), size))
 }
 
-/// Cloth of some tones with `threads` over so many `metres`.
+/// Cloth of each tone. Its pattern has `threads` threads and repeats every `metres`.
 pub(super) fn weave<const N: usize>(
     b: &mut Builder,
     metres: f32,
