@@ -1,18 +1,19 @@
 //! What a camera sees, as far as a few rays tell before anything is rendered.
 
+use std::ops::Range;
+
 use glam::Vec2;
 use rayon::prelude::*;
 
 use super::view::{Sampling, View};
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
-use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::math::Frame;
 use crate::path::aim_targets::Aiming;
 use crate::path::camera::CameraRays;
 use crate::path::limits::{CutOff, MAX_INTERFACES};
-use crate::path::lit_targets::Lighting;
+use crate::path::lit_targets::Conditions;
 use crate::path::{Lit, LocalLights, PathLimits, PathTracer, World};
 use crate::sampler::Sampler;
 
@@ -65,20 +66,27 @@ const MIN_CUT_OFF: f32 = 0.02;
 
 /// What limits take of the picture's paths, in the mean.
 fn cut_off(lit: Lit<'_>, view: &View) -> CutOff {
-    let [width, height] = view.whole_size();
-    let rays = CameraRays::new(&view.camera, width, height);
     let tracer = view.tracer(lit, None);
-    let places: Vec<Vec2> = places([width, height]).collect();
-    let of_path = |index: usize| {
-        let (place, path) = (index % places.len(), index / places.len());
-        let sampler = Sampler::new(SEED, place as u32, path as u32);
-        tracer.cut_off(rays.ray(places[place], Vec2::ZERO), sampler)
-    };
-    let paths = 0..PATHS * places.len();
-    let of_paths: Vec<CutOff> = paths.into_par_iter().map(of_path).collect();
-    let mean =
-        |part: fn(&CutOff) -> f32| of_paths.iter().map(part).sum::<f32>() / of_paths.len() as f32;
+    let cuts = of_paths(view, 0..PATHS, |ray, sampler| tracer.cut_off(ray, sampler));
+    let mean = |part: fn(&CutOff) -> f32| cuts.iter().map(part).sum::<f32>() / cuts.len() as f32;
     CutOff { by_bounces: mean(|cut| cut.by_bounces), by_interfaces: mean(|cut| cut.by_interfaces) }
+}
+
+/// What paths of these numbers through places all over the picture find: by number, then by place.
+fn of_paths<T: Send>(
+    view: &View,
+    numbers: Range<usize>,
+    of_path: impl Fn(Ray, Sampler) -> T + Sync,
+) -> Vec<T> {
+    let size @ [width, height] = view.whole_size();
+    let rays = CameraRays::new(&view.camera, width, height);
+    let places: Vec<Vec2> = places(size).collect();
+    let of_index = |index: usize| {
+        let (number, place) = (numbers.start + index / places.len(), index % places.len());
+        let sampler = Sampler::new(SEED, place as u32, number as u32);
+        of_path(rays.ray(places[place], Vec2::ZERO), sampler)
+    };
+    (0..numbers.len() * places.len()).into_par_iter().map(of_index).collect()
 }
 
 /// Parts of the picture along each axis whose share of light from targets is found.
@@ -102,9 +110,10 @@ pub(super) fn lights_of(
         return chosen;
     }
     let lights = chosen.as_ref().unwrap_or(&lit.0.lights);
-    let limits = limits_of_probes(view);
+    let conditions = conditions_of(view);
+    let limits = conditions.limits;
     let tracer = PathTracer { lights, limits, layers: false, ..view.tracer(lit, grid) };
-    let Some(targets) = lit.0.targets.of(lighting_of(lit.1, view), || {
+    let Some(targets) = lit.0.targets.of(lit.1, conditions, || {
         // All views of the scene are to aim alike.
         let grid = LightGrid::whole_map(lit.1.tile_energies());
         PathTracer { grid: grid.as_ref(), ..tracer }.aim_targets()
@@ -123,35 +132,28 @@ pub(super) fn lights_of(
     Some(lights)
 }
 
-/// Limits of paths that find out how bright targets are.
-fn limits_of_probes(view: &View) -> PathLimits {
-    PathLimits { bounces: view.limits.bounces.min(4), ..view.limits }
-}
-
-/// What decides how bright targets are for a view.
-fn lighting_of(environment: &Environment, view: &View) -> Lighting {
-    let (environment, limits) = (environment.clone(), limits_of_probes(view));
-    Lighting { environment, limits, medium: view.medium, lights: view.local_lights.clone() }
+/// What decides how bright targets are for a view, beside the map. A few bounces tell.
+fn conditions_of(view: &View) -> Conditions {
+    let limits = PathLimits { bounces: view.limits.bounces.min(4), ..view.limits };
+    Conditions { limits, medium: view.medium, lights: view.local_lights.clone() }
 }
 
 /// Share of the picture's light that comes straight from targets: the median of some estimates, for a few paths that a
 /// metal dazzles make one far too large.
 fn share_of_targets(tracer: &PathTracer<'_>, view: &View) -> f32 {
-    let estimates = (0..ESTIMATES as u32).into_par_iter();
-    let mut shares: Vec<f32> =
-        estimates.map(|estimate| estimated_share(tracer, view, estimate)).collect();
+    let numbers = PATHS..PATHS + ESTIMATES;
+    let found = of_paths(view, numbers, |ray, sampler| tracer.light_of_targets(ray, sampler));
+    let estimates = found.chunks(found.len() / ESTIMATES);
+    let mut shares: Vec<f32> = estimates.map(mean_share).collect();
     shares.sort_unstable_by(f32::total_cmp);
     shares[ESTIMATES / 2]
 }
 
-/// The mean over parts of the picture: what a lamp shines on near by may be brighter than all the rest.
-fn estimated_share(tracer: &PathTracer<'_>, view: &View, estimate: u32) -> f32 {
-    let size @ [width, height] = view.whole_size();
-    let rays = CameraRays::new(&view.camera, width, height);
+/// Share of light from targets by one path through each place, with all its light: the mean over parts of the picture,
+/// for what a lamp shines on near by may be brighter than all the rest.
+fn mean_share(of_places: &[[f32; 2]]) -> f32 {
     let mut parts = [[0.0; 2]; (PARTS * PARTS) as usize];
-    for (index, place) in (0..).zip(places(size)) {
-        let sampler = Sampler::new(SEED, index, PATHS as u32 + estimate);
-        let light = tracer.light_of_targets(rays.ray(place, Vec2::ZERO), sampler);
+    for (index, light) in (0..).zip(of_places) {
         let part = [index % LOOKS, index / LOOKS].map(|place| place * PARTS / LOOKS);
         let sums = &mut parts[(part[1] * PARTS + part[0]) as usize];
         *sums = [sums[0] + light[0], sums[1] + light[1]];
@@ -201,7 +203,7 @@ pub(super) mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::environment::{EnvironmentOptions, sky};
+    use crate::environment::{Environment, EnvironmentOptions, sky};
     use crate::image::Image;
     use crate::math::uv_from_direction;
     use crate::path::{PathLimits, WorldBuilder};
@@ -318,8 +320,7 @@ pub(super) mod tests {
         let (world, mut map, view) = room_with_metal(0.2);
         let found = |map: &Environment, view: &View| {
             aim_probability((&world, map, view));
-            let lighting = lighting_of(map, view);
-            world.targets.of(lighting, || None).expect("there is metal")
+            world.targets.of(map, conditions_of(view), || None).expect("there is metal")
         };
         let first = found(&map, &view);
         let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, 1.0);
