@@ -85,7 +85,13 @@ impl Display {
         let is_alone = overlay.is_none() && compared.is_none() && snapshot.plain.is_none();
         let is_ahead = |latest: &Arc<Request>| match latest.moving {
             true => latest.view != request.view,
-            false => is_alone && latest.previews && request.restarts(latest),
+            // The last picture of a movement shows more of it than what can be carried there.
+            false => {
+                is_alone
+                    && latest.previews
+                    && request.restarts(latest)
+                    && !request.comes_to_rest_as(latest)
+            }
         };
         self.presenter.order(Order {
             developer: Arc::clone(&self.screen.developer),

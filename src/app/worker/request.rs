@@ -77,6 +77,12 @@ impl Request {
             && self.environment.shares_map_with(&new.environment)
     }
 
+    /// Whether `new` is the view at rest in which this movement ends.
+    pub(in crate::app) fn comes_to_rest_as(&self, new: &Self) -> bool {
+        let at_rest = || Self { moving: false, ..self.clone() };
+        self.moving && !new.moving && !at_rest().restarts(new)
+    }
+
     /// Whether work for `self` is to be dropped for `new`.
     pub(super) fn is_ended_by(&self, new: &Self) -> bool {
         self.restarts(new) && !self.is_followed_by(new)

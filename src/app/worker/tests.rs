@@ -257,7 +257,13 @@ fn a_movement_is_seen_while_it_goes_on() {
     }
     // Something else is not kept waiting, and nothing else is shown for it.
     assert!(!request.is_followed_by(&request_of("office", [640, 480])));
-    assert!(!request.is_followed_by(&Request { moving: false, ..request.clone() }));
+    let at_rest = Request { moving: false, ..request.clone() };
+    assert!(!request.is_followed_by(&at_rest));
+    // Its last picture is that of the view at rest.
+    assert!(request.comes_to_rest_as(&at_rest) && !at_rest.comes_to_rest_as(&request));
+    let mut elsewhere = at_rest.clone();
+    elsewhere.view.camera.world_from_camera.translation.x += 0.05;
+    assert!(!request.comes_to_rest_as(&elsewhere) && !request.comes_to_rest_as(&request));
 }
 
 #[test]
