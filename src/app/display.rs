@@ -85,13 +85,7 @@ impl Display {
         let is_alone = overlay.is_none() && compared.is_none() && snapshot.plain.is_none();
         let is_ahead = |latest: &Arc<Request>| match latest.moving {
             true => latest.view != request.view,
-            // The last picture of a movement shows more of it than what can be carried there.
-            false => {
-                is_alone
-                    && latest.previews
-                    && request.restarts(latest)
-                    && !request.comes_to_rest_as(latest)
-            }
+            false => is_alone && latest.previews && request.is_left_for(latest),
         };
         self.presenter.order(Order {
             developer: Arc::clone(&self.screen.developer),

@@ -31,6 +31,8 @@ const DIFFERENCES: [f32; 2] = [0.06, 0.2];
 pub(super) struct Carried {
     last: Option<Whole>,
     before: Option<Whole>,
+    /// The last small picture of the movement that goes on.
+    small: Option<Arc<Image>>,
 }
 
 /// A whole picture.
@@ -68,6 +70,7 @@ impl Carried {
             return own;
         }
         self.leave_others(order.latest());
+        self.small = own.image.clone().filter(|_| order.latest().moving);
         let completed = self.complete(order, own);
         if order.ahead.is_none() {
             self.keep(&order.snapshot, completed.image.as_ref());
@@ -75,7 +78,8 @@ impl Carried {
         completed
     }
 
-    /// What the last picture shows of the view of the request ahead; `None` if that is less than half.
+    /// What the last picture shows of the view of the request ahead; `None` if that is less than half. In a movement its
+    /// small picture shows the rest.
     pub(super) fn ahead(&self, order: &Order) -> Option<Image> {
         let request = order.ahead.as_ref()?;
         let is_of_use =
@@ -84,7 +88,8 @@ impl Carried {
         let view = carried_view(&request.view);
         let seen = last.keyframe.seen_in(&view, None);
         let is_half = 2 * seen.iter().flatten().count() >= seen.len();
-        is_half.then(|| under(&seen, &last.blurred, [view.width, view.height]))
+        let unseen = self.small.as_deref().unwrap_or(&last.blurred);
+        is_half.then(|| under(&seen, unseen, [view.width, view.height]))
     }
 
     /// Keeps what is seen, if it is a whole picture at rest.
@@ -253,7 +258,7 @@ mod tests {
             image_of(carried.complete(&order(request, film), own(film)))
         };
 
-        let mut moving = Request { moving: true, ..still.clone() };
+        let mut moving = Request { moving: true, previews: true, ..still.clone() };
         let small = rendered(&moving, [12, 9], 1);
         let alone = complete(&carried, &moving, &small);
         assert_eq!((alone.width, alone.pixels[0]), (12, [0.5; 3]), "nothing is known yet");
@@ -284,6 +289,15 @@ mod tests {
         let (onward, there) = (image_of(onward), image_of(there));
         let (same, other) = (apart(&onward, &there), apart(&onward, &along));
         assert!(same < 0.1 && other > 0.5, "{same}, {other}");
+        // The small picture shows what is not seen, as soon as there is one.
+        let seen = |carried: &Carried| {
+            let ahead = Some(Arc::new(later.clone()));
+            carried.ahead(&Order { ahead, ..order(&moving, &small) }).expect("most is seen")
+        };
+        let before = seen(&carried);
+        carried.carry(&order(&moving, &small), own(&small));
+        let changed = apart(&seen(&carried), &before);
+        assert!(changed > 0.0 && changed < 0.2, "{changed}");
 
         // At rest the new picture takes its place, where it differs at once.
         let rest = Request { moving: false, ..moving.clone() };

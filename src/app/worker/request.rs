@@ -77,10 +77,10 @@ impl Request {
             && self.environment.shares_map_with(&new.environment)
     }
 
-    /// Whether `new` is the view at rest in which this movement ends.
-    pub(in crate::app) fn comes_to_rest_as(&self, new: &Self) -> bool {
-        let at_rest = || Self { moving: false, ..self.clone() };
-        self.moving && !new.moving && !at_rest().restarts(new)
+    /// Whether `new` shows something else: no picture of a movement is left for the view at rest in which that ends.
+    pub(in crate::app) fn is_left_for(&self, new: &Self) -> bool {
+        let moving = self.moving && new.moving;
+        Self { moving, ..self.clone() }.restarts(new)
     }
 
     /// Whether work for `self` is to be dropped for `new`.

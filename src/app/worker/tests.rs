@@ -260,10 +260,10 @@ fn a_movement_is_seen_while_it_goes_on() {
     let at_rest = Request { moving: false, ..request.clone() };
     assert!(!request.is_followed_by(&at_rest));
     // Its last picture is that of the view at rest.
-    assert!(request.comes_to_rest_as(&at_rest) && !at_rest.comes_to_rest_as(&request));
+    assert!(!request.is_left_for(&at_rest) && at_rest.is_left_for(&request));
     let mut elsewhere = at_rest.clone();
     elsewhere.view.camera.world_from_camera.translation.x += 0.05;
-    assert!(!request.comes_to_rest_as(&elsewhere) && !request.comes_to_rest_as(&request));
+    assert!(request.is_left_for(&elsewhere) && !request.is_left_for(&request));
 }
 
 #[test]
