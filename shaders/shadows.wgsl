@@ -126,18 +126,25 @@ fn follow_through_glass(path: ptr<function, Path>, shadow: ptr<function, Shadow>
             (*shadow).light = (*shadow).carried * radiance;
             return walk.transmittance;
         }
-        if is_straight {
-            // Where a lamp is found through an edge, rounding may lose the one that was chosen.
-            let chosen = max(walk.lamp_pdf, (*shadow).pdf_solid_angle);
-            (*shadow).light = (*shadow).carried * radiance;
-            (*shadow).weight = 1.0 / (chosen + (*shadow).own_pdf);
-            return vec3f(1.0);
+        var chosen = (*shadow).pdf_solid_angle;
+//#if SHEER_EMITTERS
+        if !is_straight {
+            radiance = walk.emitted;
+            if all(radiance == vec3f(0.0)) {
+                return vec3f(0.0);
+            }
+            is_straight = true;
+            continue;
         }
+        // Where a lamp is found through an edge, rounding may lose the one that was chosen.
+        chosen = max(walk.lamp_pdf, chosen);
+//#else
+        // The straight ray ends at an opaque lamp.
         radiance = walk.emitted;
-        if all(radiance == vec3f(0.0)) {
-            return vec3f(0.0);
-        }
-        is_straight = true;
+//#end
+        (*shadow).light = (*shadow).carried * radiance;
+        (*shadow).weight = 1.0 / (chosen + (*shadow).own_pdf);
+        return vec3f(1.0);
     }
     return vec3f(0.0);
 }

@@ -10,6 +10,7 @@ use crate::bvh::{Hit, Ray};
 use crate::environment::TileSearch;
 use crate::light_grid::TileChoice;
 use crate::math::balance_heuristic;
+use crate::scene::needs::SceneFeatures;
 
 /// What next event estimation has chosen to look at.
 #[derive(Default)]
@@ -115,11 +116,16 @@ impl Path<'_> {
                 if emitted == Vec3::ZERO {
                     return None;
                 }
-                let straight =
-                    GlassWalk::new(self.tracer, endless, body, Course::Straight, Some(&receiver));
-                self.rays += straight.rays;
-                // Where it is found through an edge, rounding may lose the one that was chosen.
-                emitted / (straight.lamp_pdf.max(sample.pdf_solid_angle) + own_pdf)
+                let mut pdf = sample.pdf_solid_angle;
+                // The straight ray ends at an opaque lamp.
+                if world.needs.has(SceneFeatures::SHEER_EMITTERS) {
+                    let (course, receiver) = (Course::Straight, Some(&receiver));
+                    let walk = GlassWalk::new(self.tracer, endless, body, course, receiver);
+                    self.rays += walk.rays;
+                    // Where it is found through an edge, rounding may lose the one that was chosen.
+                    pdf = walk.lamp_pdf.max(pdf);
+                }
+                emitted / (pdf + own_pdf)
             }
         };
         if light == Vec3::ZERO {

@@ -74,6 +74,8 @@ bitflags::bitflags! {
         const LIFTED = 1 << 29;
         /// Surfaces that may have narrow reflections beside broad ones: polish and varnish.
         const POLISH = 1 << 30;
+        /// Emissive triangles that light may pass straight on.
+        const SHEER_EMITTERS = 1 << 31;
     }
 }
 
@@ -188,6 +190,7 @@ impl SceneNeeds {
         }
         let has_inside = m.has_inside();
         let is_rough = m.roughness > 0.0 || m.anisotropy > 0.0;
+        let is_opaque = m.alpha_mode == AlphaMode::Opaque;
         for (feature, is_needed) in [
             (S::TEXTURES, m.textures.iter().any(Option::is_some)),
             (S::SECOND_UV_SET, m.textures.iter().flatten().any(|texture| texture.uv_set == 1)),
@@ -210,6 +213,7 @@ impl SceneNeeds {
             (S::UNLIT, m.unlit),
             (S::EMITTERS, is_emitter(m)),
             (S::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
+            (S::SHEER_EMITTERS, is_emitter(m) && (m.transmission > 0.0 || !is_opaque)),
             (S::ROUGH_METALS, is_rough && (m.metallic > 0.0 || m.ior == 0.0)),
             (S::ROUGH_GLASS, is_rough && m.transmission > 0.0),
             (S::CLEAR_SOLIDS, m.is_clear_solid()),

@@ -5,7 +5,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::light_grid::Recording;
 use lightgrid::path::{Background, PathLimits, World, WorldBuilder, framing};
@@ -14,7 +14,9 @@ use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, UploadedScene};
 use lightgrid::render::{Crop, Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
-use lightgrid::scene::{Camera, Material, Medium, PunctualKind, PunctualLight, builtin, gltf};
+use lightgrid::scene::{
+    AlphaMode, Camera, Material, Medium, PunctualKind, PunctualLight, builtin, gltf,
+};
 
 use crate::estimator::scenes::{self, lambert, lamp, painted, room, smoked_glass, varnish};
 use crate::estimator::{MODES, mean, render, view};
@@ -248,7 +250,7 @@ fn fog_and_milk_look_the_same() {
     }
 }
 
-/// Behind a pane, in a ball of smoked glass and seen in a mirror: the map, an emissive ball and a light without size,
+/// Behind a pane, in a ball of smoked glass and seen in a mirror: the map, emissive balls and a light without size,
 /// in clear air and in fog, with pixels that share and without.
 #[test]
 fn light_through_solid_glass_looks_the_same() {
@@ -267,7 +269,13 @@ fn light_through_solid_glass_looks_the_same() {
         .quad(&mirror, [-1.9, 0.3, -1.4], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0])
         .sphere(&smoked_glass(), bulb, 0.4);
     let by_day = lit.clone().light(light).build();
-    let by_lamp = lit.sphere(&lamp(5.0), bulb, 0.15).build();
+    let by_lamp = lit.clone().sphere(&lamp(5.0), bulb, 0.15).build();
+    let sheer = Material {
+        base_color: Vec4::new(1.0, 1.0, 1.0, 0.5),
+        alpha_mode: AlphaMode::Blend,
+        ..lamp(5.0)
+    };
+    let by_sheer_lamp = lit.sphere(&sheer, bulb, 0.15).build();
     let fog = Medium {
         scattering: Vec3::new(0.1, 0.2, 0.4),
         absorption: Vec3::new(0.02, 0.01, 0.0),
@@ -278,7 +286,7 @@ fn light_through_solid_glass_looks_the_same() {
         ("light", &by_day, None, Sampling::Plain, Sharing::Off),
         ("learned", &by_day, None, Sampling::Adaptive, Sharing::Large),
         ("lamp", &by_lamp, None, Sampling::Plain, Sharing::Large),
-        ("lamp in fog", &by_lamp, Some(fog), Sampling::Plain, Sharing::Off),
+        ("sheer lamp in fog", &by_sheer_lamp, Some(fog), Sampling::Plain, Sharing::Off),
     ] {
         let what = format!("{what}, {sharing:?}");
         let view = View {

@@ -9,7 +9,7 @@ use lightgrid::light_grid::LightGrid;
 use lightgrid::light_grid::cells::SphericalGrid;
 use lightgrid::path::{PathLimits, World, WorldBuilder};
 use lightgrid::render::{Sampling, Session, Sharing, View};
-use lightgrid::scene::{Camera, Material, Medium, PunctualKind, PunctualLight};
+use lightgrid::scene::{AlphaMode, Camera, Material, Medium, PunctualKind, PunctualLight};
 
 use super::scenes::{lambert, lamp, pane, room, smoked_glass, sunlight, unlit};
 use super::unbiased::expect_agreement;
@@ -184,10 +184,16 @@ fn lamps_behind_glass_light_the_same_as_those_that_are_found() {
         let view = View { seed, ..view(camera.clone(), Sampling::Plain, 3) };
         render(world, &constant(0.1), view, samples)
     };
-    for (what, place) in
-        [("bulb", &bulb as &dyn Fn(&Material) -> (World, Camera)), ("panels", &panels)]
-    {
-        let [found, sampled] = [unlit(0.9), lamp(0.9)].map(|panel| place(&panel));
+    let (opaque, sheer) = ((1.0, AlphaMode::Opaque), (0.5, AlphaMode::Blend));
+    for (what, place, (alpha, alpha_mode)) in [
+        ("bulb", &bulb as &dyn Fn(&Material) -> (World, Camera), opaque),
+        ("panels", &panels, opaque),
+        ("sheer panels", &panels, sheer),
+    ] {
+        let [found, sampled] = [unlit(0.9), lamp(0.9)].map(|panel| {
+            let base_color = panel.base_color.with_w(alpha);
+            place(&Material { base_color, alpha_mode, ..panel })
+        });
         expect_agreement(what, &film(&found, 1, 4096), &film(&sampled, 2, 1024), 0.05);
     }
 }
