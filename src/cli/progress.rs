@@ -13,17 +13,20 @@ pub(super) struct Progress {
     bar: ProgressBar,
     /// What every message begins with.
     prefix: String,
-    /// The noise shown, and when it was found.
-    noise: Cell<Option<(Instant, f64)>>,
+    /// The error shown, and when it was found.
+    error: Cell<Option<(Instant, RelativeError)>>,
     /// When a line was last written for a file or another program, or it was begun.
     written: Cell<Instant>,
 }
 
+/// What a picture is off by, relative to its light, and what that is called.
+pub(super) type RelativeError = (f64, &'static str);
+
 /// A line is written so often where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(60);
 
-/// The noise is looked at so often: that takes a look at every pixel, wherever it is.
-const NOISE_EVERY: Duration = Duration::from_secs(2);
+/// The error is looked at so often: that takes a look at every pixel, wherever it is.
+const ERROR_EVERY: Duration = Duration::from_secs(2);
 
 impl Progress {
     /// Starts with a message; stays invisible unless stderr is a terminal (indicatif looks).
@@ -37,7 +40,7 @@ impl Progress {
         if !bar.is_hidden() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Self { bar, prefix: String::new(), noise: Cell::default(), written: Instant::now().into() }
+        Self { bar, prefix: String::new(), error: Cell::default(), written: Instant::now().into() }
     }
 
     /// The next one, which says which of the frames it is about.
@@ -51,26 +54,27 @@ impl Progress {
         self.bar.set_message(format!("{}{}", self.prefix, message.into()));
     }
 
-    /// Shows where a session is, and the samples of cached light beside it with the seconds they took.
-    pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule, cached: (u32, f64)) {
+    /// Shows where a session is, the samples of cached light beside it with the seconds they took, and the error, which
+    /// is a moment old.
+    pub(super) fn show(
+        &self,
+        session: &Session<'_>,
+        rule: &StopRule,
+        cached: (u32, f64),
+        find_error: impl FnOnce() -> Option<RelativeError>,
+    ) {
+        let line = || {
+            let known = self.error.get().filter(|(at, _)| at.elapsed() < ERROR_EVERY);
+            let error = known.or_else(|| Some((Instant::now(), find_error()?)));
+            self.error.set(error);
+            line(session, rule, error.map(|(_, error)| error), cached)
+        };
         if !self.bar.is_hidden() {
-            self.say(line(session, rule, self.noise(session), cached));
+            self.say(line());
         } else if self.written.get().elapsed() > LINE_EVERY {
             self.written.set(Instant::now());
-            let line = line(session, rule, self.noise(session), cached);
-            tell(format_args!("lightgrid: {}{line}", self.prefix));
+            tell(format_args!("lightgrid: {}{}", self.prefix, line()));
         }
-    }
-
-    /// Noise of the film, a moment old; infinite before there is any.
-    fn noise(&self, session: &Session<'_>) -> f64 {
-        let known = self.noise.get().filter(|(at, _)| at.elapsed() < NOISE_EVERY);
-        let (at, noise) = known.unwrap_or_else(|| {
-            let is_there = session.samples() > 1;
-            (Instant::now(), if is_there { session.noise() } else { f64::INFINITY })
-        });
-        self.noise.set(noise.is_finite().then_some((at, noise)));
-        noise
     }
 
     /// Leaves lines on stderr, above the line.
@@ -84,7 +88,12 @@ impl Progress {
     }
 }
 
-fn line(session: &Session<'_>, rule: &StopRule, noise: f64, cached: (u32, f64)) -> String {
+fn line(
+    session: &Session<'_>,
+    rule: &StopRule,
+    error: Option<RelativeError>,
+    cached: (u32, f64),
+) -> String {
     let figures = session.figures();
     if session.phase() == Phase::Learning {
         let (done, total) = (figures.learning_paths, session.view().learning_paths);
@@ -95,9 +104,11 @@ fn line(session: &Session<'_>, rule: &StopRule, noise: f64, cached: (u32, f64)) 
         || format!("rendering, {samples} samples"),
         |limit| format!("rendering, {samples}/{} samples", limit + cached.0),
     );
-    if noise.is_finite() {
-        text += &format!(", noise {:.1}%", 100.0 * noise);
+    if let Some((error, name)) = error {
+        text += &format!(", {name} {:.1}%", 100.0 * error);
     }
+    // A limit of noise has that shown.
+    let noise = error.map_or(f64::INFINITY, |(error, _)| error);
     if let Some(left) = seconds_left(session, rule, noise, cached) {
         text += &format!(", {} left", in_words(left));
     }

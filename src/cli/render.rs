@@ -413,7 +413,8 @@ fn work<'a>(
 ) -> Result<()> {
     let alarm = Alarm::start(Arc::clone(&interrupt.asked));
     loop {
-        progress.show(&driver.session, &driver.rule, (beside.counted(), beside.seconds));
+        let (session, cached) = (&driver.session, (beside.counted(), beside.seconds));
+        progress.show(session, &driver.rule, cached, || beside.error(session));
         if beside.advance(driver, &interrupt.asked)? {
             continue;
         }

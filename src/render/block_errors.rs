@@ -27,7 +27,6 @@ impl BlockErrors {
     }
 
     /// Root of the squared error of that picture.
-    #[cfg(feature = "window")]
     pub(crate) fn left(&self) -> f32 {
         (self.exact.sqrt() as f32) * (1.0 - self.share()).sqrt()
     }

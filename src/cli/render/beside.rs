@@ -4,9 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::RenderArguments;
+use crate::cli::progress::RelativeError;
 use crate::error::Result;
 use crate::memory;
 use crate::path::Lit;
+use crate::render::block_errors::block_errors;
 use crate::render::cached_picture::{CachedPicture, suits};
 use crate::render::film::Film;
 use crate::render::{Driver, Sampling, Session, StopRule, View};
@@ -21,6 +23,8 @@ pub(super) struct Beside<'a> {
     is_wanted: bool,
     /// Whether exact samples are wanted for themselves. Else what was asked for is the number of both together.
     wants_exact: bool,
+    /// Whether noise of pixels is taken out of what is asked for.
+    is_denoised: bool,
     picture: Option<CachedPicture<Session<'a>>>,
     /// Seconds that it has taken.
     pub(super) seconds: f64,
@@ -32,13 +36,14 @@ impl<'a> Beside<'a> {
     /// there is no memory for another film of so many `bytes`.
     pub(super) fn new(arguments: &RenderArguments, lit: Lit<'a>, view: &View, bytes: u64) -> Self {
         let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
+        let is_denoised = arguments.picture.is_denoised(&arguments.pictures());
         let is_one = arguments.frames.is_none() && arguments.turntable.is_none();
         let is_wanted = arguments.gi.is_none()
             && !is_kept
             && is_one
             && view.sampling == Sampling::Adaptive
             && view.width.min(view.height) >= MIN_SIZE
-            && arguments.picture.is_denoised(&arguments.pictures())
+            && is_denoised
             && suits(lit.0, view)
             && memory::check(bytes).is_ok();
         Self {
@@ -46,6 +51,7 @@ impl<'a> Beside<'a> {
             is_wanted,
             wants_exact: arguments.noise.is_some()
                 || arguments.picture.shows_rendered(&arguments.pictures()),
+            is_denoised,
             picture: None,
             seconds: 0.0,
             asked: arguments.stop_rule(),
@@ -86,6 +92,18 @@ impl<'a> Beside<'a> {
     pub(super) fn counted(&self) -> u32 {
         let picture = self.picture.as_ref().filter(|_| !self.wants_exact);
         picture.map_or(0, |picture| picture.session.samples())
+    }
+
+    /// What the picture is off by: noise of pixels or, where that is taken out of all that was asked for, the error of
+    /// areas. `None` before it is known.
+    pub(super) fn error(&self, main: &Session<'_>) -> Option<RelativeError> {
+        if self.is_denoised && !self.wants_exact {
+            let cached = self.film().filter(|film| main.film().is_alike(film));
+            let errors = block_errors(main.film(), cached)?;
+            return Some((f64::from(errors.left()), "denoised error"));
+        }
+        let noise = if main.samples() > 1 { main.noise() } else { f64::INFINITY };
+        noise.is_finite().then_some((noise, "noise"))
     }
 
     /// The film by cached light, once all of its pixels have a sample.
