@@ -77,7 +77,8 @@ impl Request {
             && self.environment.shares_map_with(&new.environment)
     }
 
-    /// Whether `new` shows something else: no picture of a movement is left for the view at rest in which that ends.
+    /// Whether pictures for `self` show something else than `new` asks for. A movement's pictures show the view at rest
+    /// that it ends in.
     pub(in crate::app) fn is_left_for(&self, new: &Self) -> bool {
         let moving = self.moving && new.moving;
         Self { moving, ..self.clone() }.restarts(new)

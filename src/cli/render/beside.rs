@@ -95,15 +95,15 @@ impl<'a> Beside<'a> {
     }
 
     /// What the picture is off by: noise of pixels or, where that is taken out of all that was asked for, the error of
-    /// areas. `None` before it is known.
+    /// areas. `None` before it is known, and where some samples are others' ([`Session::noise`]).
     pub(super) fn error(&self, main: &Session<'_>) -> Option<RelativeError> {
-        if self.is_denoised && !self.wants_exact {
-            let cached = self.film().filter(|film| main.film().is_alike(film));
-            let errors = block_errors(main.film(), cached)?;
-            return Some((f64::from(errors.left()), "denoised error"));
+        let noise = (main.samples() > 1).then(|| main.noise());
+        let noise = noise.filter(|noise| noise.is_finite())?;
+        if self.wants_exact || !self.is_denoised {
+            return Some((noise, "noise"));
         }
-        let noise = if main.samples() > 1 { main.noise() } else { f64::INFINITY };
-        noise.is_finite().then_some((noise, "noise"))
+        let errors = block_errors(main.film(), self.film())?;
+        Some((f64::from(errors.left()), "denoised error"))
     }
 
     /// The film by cached light, once all of its pixels have a sample.
