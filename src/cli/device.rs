@@ -37,6 +37,14 @@ pub(super) fn run(arguments: &DevicesArguments) -> Result<()> {
     Ok(())
 }
 
+/// Refuses a GPU that no build without GPU rendering has, before anything is loaded.
+pub(super) fn check(choice: DeviceChoice) -> Result<()> {
+    if choice == DeviceChoice::Gpu && !cfg!(feature = "gpu") {
+        return Err(Error::new(NO_GPU));
+    }
+    Ok(())
+}
+
 /// Prints a notice and keeps it for the record.
 pub(super) fn say(notices: &mut Notices, sentence: String) {
     notice(&sentence);

@@ -55,6 +55,7 @@ const BYTES_OF_ENCODERS: u64 = 16 << 20;
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     outputs::check(arguments)?;
+    super::device::check(arguments.device)?;
     start_threads(arguments.threads)?;
     let interrupt = Interrupt::watch("stopping after this pass and writing the picture");
     let progress = Progress::start("loading the scene and the map");
