@@ -61,7 +61,7 @@ pub(super) struct Guides {
 }
 
 impl Guide {
-    fn of(samples: &Samples<'_>, index: usize) -> Self {
+    pub(super) fn of(samples: &Samples<'_>, index: usize) -> Self {
         let [r, g, b, depth, x, y, z, hits] = samples.first_hits(index);
         let samples = samples.count(index).max(1) as f32;
         let coverage = hits / samples;

@@ -10,11 +10,13 @@ mod oidn;
 #[path = "no_oidn.rs"]
 mod oidn;
 mod samples;
+mod upsample;
 
 use std::sync::atomic::AtomicBool;
 
 use samples::{Quality, Samples};
 use serde::{Deserialize, Serialize};
+pub(crate) use upsample::FineGuides;
 
 use crate::error::Result;
 use crate::image::Image;
@@ -68,17 +70,19 @@ impl Denoiser {
     /// The film's picture without noise, for the screen: Open Image Denoise takes half the time that it takes for a file,
     /// and leaves up to 7 % more error (FLIP). Samples of `other`, a film of the same view, size and layers, count as
     /// well, each as much as that many of the film's own. Without layers on the film the à-trous filter leaves it as it is.
-    /// Until all pixels have a sample the picture is one of larger pixels, enlarged. `None` if `cancel` is set meanwhile.
+    /// Until all pixels have a sample the picture is one of larger pixels, enlarged. It takes the size of `fine`, the
+    /// surfaces of a larger picture of the same view. `None` if `cancel` is set meanwhile.
     ///
     /// # Errors
     /// If the library is missing or fails.
-    pub fn preview(
+    pub(crate) fn preview(
         self,
         film: &Film,
         other: Option<(&Film, f32)>,
+        fine: Option<&FineGuides>,
         cancel: &AtomicBool,
     ) -> Result<Option<Image>> {
-        self.run(film, other, Quality::Fast, cancel)
+        self.run(film, other, fine, (Quality::Fast, cancel))
     }
 
     /// The same for a file: Open Image Denoise takes noise out of albedo and normals first, where that is a tenth of the
@@ -90,43 +94,49 @@ impl Denoiser {
         let samples = other.map_or(0, |(other, _)| other.min_samples()) + film.min_samples();
         let is_prefiltered = samples >= PREFILTERED_SAMPLES;
         let quality = if is_prefiltered { Quality::Prefiltered } else { Quality::High };
-        self.run(film, other, quality, &NEVER).map(|image| image.expect("it is not cancelled"))
+        self.run(film, other, None, (quality, &NEVER))
+            .map(|image| image.expect("it is not cancelled"))
     }
 
     fn run(
         self,
         film: &Film,
         other: Option<(&Film, f32)>,
-        quality: Quality,
-        cancel: &AtomicBool,
+        fine: Option<&FineGuides>,
+        (quality, cancel): (Quality, &AtomicBool),
     ) -> Result<Option<Image>> {
-        let filter = |samples: &Samples<'_>| -> Result<Option<Image>> {
+        let Film { width, height, .. } = *film;
+        let size = [width, height].map(|side| side as f32);
+        let filter = |film: &Film, other, every: u32| -> Result<Option<Image>> {
+            let samples = &Samples::of(film, other);
+            let fine = fine.filter(|fine| film.has_layers() && film.width < fine.width);
             let image = match self.found() {
-                Self::ATrous if !samples.film.has_layers() => {
-                    return Ok(Some(samples.film.image()));
-                }
+                Self::ATrous if !film.has_layers() => Some(film.image()),
                 Self::ATrous => a_trous::denoise(samples, cancel),
                 _ => oidn::denoise(samples, quality, cancel)?,
             };
-            Ok(image.map(|image| samples.restored(image)))
+            let image = image.map(|image| samples.restored(image));
+            Ok(image.map(|image| match fine {
+                Some(fine) => fine.upsampled(samples, &image, size.map(|side| side / every as f32)),
+                None if every > 1 => image.enlarged(every, [width, height]),
+                None => image,
+            }))
         };
         let films = [Some(film), other.map(|(other, _)| other)].into_iter().flatten();
         let every = films.filter_map(Film::whole_pixels).min().unwrap_or(BEGINNINGS[0]);
         if every == 1 {
-            return filter(&Samples::of(film, other));
+            return filter(film, other, 1);
         }
         let larger = film.in_larger_pixels(every);
         let other = other.map(|(other, worth)| (other.in_larger_pixels(every), worth));
         let other = other.as_ref().map(|(other, worth)| (other, *worth));
-        let larger = larger.without_gaps();
-        let image = filter(&Samples::of(&larger, other))?;
-        Ok(image.map(|image| image.enlarged(every, [film.width, film.height])))
+        filter(&larger.without_gaps(), other, every)
     }
 }
 
 /// The film's picture through the filter that is always there, as by [`Denoiser::preview`].
 pub fn quick(film: &Film, other: Option<(&Film, f32)>) -> Image {
-    let image = Denoiser::ATrous.run(film, other, Quality::Fast, &NEVER);
+    let image = Denoiser::ATrous.run(film, other, None, (Quality::Fast, &NEVER));
     image.ok().flatten().expect("it neither fails nor is cancelled")
 }
 
@@ -171,7 +181,7 @@ mod tests {
             for every in [8, 4, 2, 1] {
                 let film = film([64, 48], every);
                 let image =
-                    denoiser.preview(&film, None, &NEVER).expect("filtered").expect("whole");
+                    denoiser.preview(&film, None, None, &NEVER).expect("filtered").expect("whole");
                 let squared = |at: usize| (image.pixels[at][1] - truth(at as u32 % 64)).powi(2);
                 let error = ((0..64 * 48).map(squared).sum::<f32>() / (64.0 * 48.0)).sqrt();
                 assert!(error < last, "{denoiser:?}, every {every}: {error} after {last}");
@@ -200,7 +210,7 @@ mod tests {
     fn what_is_cancelled_gives_no_picture() {
         let cancelled = AtomicBool::new(true);
         for denoiser in all() {
-            let image = denoiser.preview(&film([64, 48], 1), None, &cancelled);
+            let image = denoiser.preview(&film([64, 48], 1), None, None, &cancelled);
             assert!(image.expect("no failure").is_none(), "{denoiser:?}");
         }
     }

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::order::Order;
-use super::source::Prepared;
+use super::source::{Prepared, max_pixels};
 use crate::app::worker::{Activity, Request, Snapshot};
 use crate::color::luminance;
+use crate::denoise::FineGuides;
 use crate::image::Image;
 use crate::render::View;
 use crate::render::keyframe::Keyframe;
@@ -31,6 +32,8 @@ const DIFFERENCES: [f32; 2] = [0.06, 0.2];
 pub(super) struct Carried {
     last: Option<Whole>,
     before: Option<Whole>,
+    /// The surfaces of the last whole picture, and what it was rendered for. They are the same in another light.
+    fine: Option<(Arc<Request>, Arc<FineGuides>)>,
     /// The last small picture of the movement that goes on.
     small: Option<Arc<Image>>,
 }
@@ -73,7 +76,7 @@ impl Carried {
         self.small = own.image.clone().filter(|_| order.latest().moving);
         let completed = self.complete(order, own);
         if order.ahead.is_none() {
-            self.keep(&order.snapshot, completed.image.as_ref());
+            self.keep(order, completed.image.as_ref());
         }
         completed
     }
@@ -92,14 +95,25 @@ impl Carried {
         is_half.then(|| under(&seen, unseen, [view.width, view.height]))
     }
 
+    /// The surfaces of a picture that has fewer pixels than its view, if they were seen before.
+    pub(super) fn fine_of(&self, order: &Order) -> Option<Arc<FineGuides>> {
+        let (of, fine) = self.fine.as_ref()?;
+        let is_of_use = !order.snapshot.is_whole() && of.has_surfaces_of(&order.snapshot.request);
+        is_of_use.then(|| Arc::clone(fine))
+    }
+
     /// Keeps what is seen, if it is a whole picture at rest.
-    fn keep(&mut self, snapshot: &Snapshot, image: Option<&Arc<Image>>) {
+    fn keep(&mut self, order: &Order, image: Option<&Arc<Image>>) {
+        let snapshot = &*order.snapshot;
         let (request, film) = (&snapshot.request, &snapshot.main.film);
         let is_kept =
             snapshot.is_lasting() && request.view.crop.is_none() && film.min_samples() > 0;
         if !is_kept {
             return;
         }
+        let other = snapshot.backdrop.as_ref().map(|backdrop| &*backdrop.film);
+        let fine = FineGuides::of(film, other, max_pixels(&order.developer));
+        self.fine = fine.map(|fine| (Arc::clone(request), Arc::new(fine)));
         let image = image.cloned().unwrap_or_else(|| Arc::new(film.image()));
         if self.last.as_ref().is_some_and(|last| last.request.view != request.view) {
             self.before = self.last.take();
@@ -218,6 +232,7 @@ mod tests {
 
     use super::*;
     use crate::app::presenter::order::tests::order_of;
+    use crate::app::presenter::source::Source;
     use crate::app::presenter::source::tests::session;
     use crate::app::worker::SessionSnapshot;
     use crate::app::worker::tests::{request_of, snapshot_of};
@@ -262,9 +277,9 @@ mod tests {
         let small = rendered(&moving, [12, 9], 1);
         let alone = complete(&carried, &moving, &small);
         assert_eq!((alone.width, alone.pixels[0]), (12, [0.5; 3]), "nothing is known yet");
-        carried.keep(&snapshot(&moving, &small), None);
+        carried.keep(&order(&moving, &small), None);
         assert!(carried.last.is_none(), "a small picture is not kept");
-        carried.keep(&snapshot(&still, &film), None);
+        carried.keep(&order(&still, &film), None);
 
         // A step to the side.
         moving.view.camera.world_from_camera.translation.x += 0.05;
@@ -313,13 +328,13 @@ mod tests {
         assert!(share(&complete(&carried, &rest, &few)) > 0.8, "it agrees nowhere");
         assert!(!carried.complete(&order(&rest, &many), own(&many)).is_carried, "it may be kept");
         // It fades out, though the new picture is kept by now.
-        carried.keep(&snapshot(&rest, &few), None);
+        carried.keep(&order(&rest, &few), None);
         assert_ne!(*of_truth(&carried, &few), few.image());
-        carried.keep(&snapshot(&rest, &many), None);
+        carried.keep(&order(&rest, &many), None);
         assert_eq!(*of_truth(&carried, &few), few.image());
         // A camera that jumps: what it will see is known, unless it turns away.
         let mut carried = Carried::default();
-        carried.keep(&snapshot(&still, &film), None);
+        carried.keep(&order(&still, &film), None);
         let ahead = |change: &dyn Fn(&mut View)| {
             let mut request = still.clone();
             change(&mut request.view);
@@ -335,7 +350,7 @@ mod tests {
         assert!(away.is_none() && ahead(&|_| ()).is_none(), "nothing of it is seen, or all");
         // A window of another size.
         let mut carried = Carried::default();
-        carried.keep(&snapshot(&still, &film), None);
+        carried.keep(&order(&still, &film), None);
         let mut wide = still.clone();
         (wide.view.width, wide.view.height) = (64, 36);
         let begun = complete(&carried, &wide, &small);
@@ -348,5 +363,56 @@ mod tests {
         let other = Request { environment: request_of("open", [4, 4]).environment, ..still };
         carried.leave_others(&other);
         assert!(carried.last.is_none() && carried.before.is_none(), "the light is another");
+    }
+
+    /// The first picture in another light has an eighth of the pixels along each side.
+    #[test]
+    fn in_another_light_outlines_and_patterns_are_those_of_the_last_whole_picture() {
+        let Some(developer) = developer().map(Arc::new) else { return };
+        let still = request_of("office", [96, 72]);
+        let order = |request: &Request, film: Film| {
+            let session = session(film);
+            let snapshot = snapshot_of(&Arc::new(request.clone()), session);
+            Order { denoiser: Some(Denoiser::ATrous), ..order_of(&developer, snapshot) }
+        };
+        let mut carried = Carried::default();
+        carried.keep(&order(&still, rendered(&still, [96, 72], 4)), None);
+        let mut environment = (*still.environment).clone();
+        environment.set_rotation(2.0);
+        let turned = Request { environment: Arc::new(environment), moving: true, ..still.clone() };
+        let truth = rendered(&turned, [96, 72], 256).image();
+        let small = order(&turned, rendered(&turned, [12, 9], 16));
+        let fine = carried.fine_of(&small).expect("its surfaces are known");
+        let shown = |fine| {
+            let mut source = Source::main(&small);
+            source.fine = fine;
+            source.prepare(&developer, &AtomicBool::new(false)).expect("not cancelled").image
+        };
+        let error = |image: &Image| {
+            let of_pixel = |(index, color): (usize, &[f32; 3])| {
+                let place = [index % 96, index / 96].map(|at| at as f32 + 0.5);
+                let scale = [image.width as f32 / 96.0, image.height as f32 / 72.0];
+                let own = image.between([0, 1].map(|i| place[i] * scale[i] - 0.5));
+                f64::from((luminance(own.into()) / luminance((*color).into()).max(1e-3)).ln().abs())
+            };
+            truth.pixels.iter().enumerate().map(of_pixel).sum::<f64>() / 6912.0
+        };
+        let [plain, fine] = [None, Some(fine)].map(|fine| shown(fine).expect("on the host"));
+        assert_eq!(([plain.width, plain.height], [fine.width, fine.height]), ([12, 9], [96, 72]));
+        let [plain, fine] = [plain, fine].map(|image| error(&image));
+        eprintln!("errors of luminance: {plain:.3} enlarged, {fine:.3} in its surfaces");
+        assert!(fine < 0.7 * plain, "{fine}, {plain}");
+
+        let is_known = |request: &Request, size| {
+            carried.fine_of(&order(request, rendered(request, size, 1))).is_some()
+        };
+        let mut aside = turned.clone();
+        aside.view.camera.world_from_camera.translation.x += 0.1;
+        assert!(!is_known(&aside, [12, 9]), "other surfaces are seen");
+        assert!(!is_known(&still, [96, 72]), "it has its own");
+        assert!(
+            !is_known(&request_of("office", [96, 72]), [12, 9]),
+            "nobody knows that it is the same"
+        );
     }
 }

@@ -128,6 +128,7 @@ impl Memory {
             return Ok(None);
         }
         let mut source = Source::main(order);
+        source.fine = self.carried.fine_of(order);
         let mix = &order.snapshot.request.mix;
         // Other factors are to be seen at once.
         let is_remixed = mix.is_some() && self.mix.is_some() && *mix != self.mix;

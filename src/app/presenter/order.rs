@@ -83,7 +83,8 @@ impl Order {
     pub(in crate::app) fn image(&self) -> Image {
         let film = &self.snapshot.main.film;
         let never = AtomicBool::new(false);
-        let filtered = self.denoiser.and_then(|it| it.preview(film, None, &never).ok().flatten());
+        let filtered =
+            self.denoiser.and_then(|it| it.preview(film, None, None, &never).ok().flatten());
         filtered.unwrap_or_else(|| film.image())
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 
 use super::order::Order;
 use crate::app::worker::{Backdrop, SessionSnapshot};
-use crate::denoise::Denoiser;
+use crate::denoise::{Denoiser, FineGuides};
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 use crate::render::film::Film;
@@ -38,6 +38,11 @@ impl Prepared {
 /// Seconds of work on a view during which a device that can filter uses the built-in filter: it is the quickest.
 const YOUNG_SECONDS: f64 = 1.0;
 
+/// Most pixels of a picture that is made for a moment: software develops a million of them in a tenth of a second.
+pub(super) fn max_pixels(developer: &Developer) -> u32 {
+    if developer.gpu.facts().is_software() { 1 << 18 } else { 1 << 20 }
+}
+
 /// What a linear picture is made from.
 pub(super) struct Source {
     pub(super) session: SessionSnapshot,
@@ -47,6 +52,8 @@ pub(super) struct Source {
     is_whole: bool,
     /// How many of its pixels are as wide as one that is made ready.
     pub(super) coarseness: u32,
+    /// The surfaces of its view, where they are known in more detail.
+    pub(super) fine: Option<Arc<FineGuides>>,
 }
 
 /// Tells sources apart: equal ones give the same picture. It keeps no film in memory.
@@ -77,14 +84,15 @@ impl Source {
         let is_on_device =
             snapshot.seconds() < YOUNG_SECONDS && order.developer.can_denoise(width, height);
         let denoiser = order.denoiser.map(|it| if is_on_device { Denoiser::ATrous } else { it });
-        Self { session, backdrop, denoiser, is_whole: snapshot.is_whole(), coarseness: 1 }
+        let is_whole = snapshot.is_whole();
+        Self { session, backdrop, denoiser, is_whole, coarseness: 1, fine: None }
     }
 
     pub(super) fn plain(order: &Order) -> Option<Self> {
         let session = order.snapshot.plain.clone().filter(SessionSnapshot::is_begun)?;
         let is_whole = session.samples > 0;
         let (backdrop, denoiser) = (None, order.denoiser);
-        Some(Self { session, backdrop, denoiser, is_whole, coarseness: 1 })
+        Some(Self { session, backdrop, denoiser, is_whole, coarseness: 1, fine: None })
     }
 
     pub(super) fn key(&self) -> SourceKey {
@@ -117,9 +125,14 @@ impl Source {
             let session = SessionSnapshot { film: coarse(film), ..self.session.clone() };
             let with_film = |of: &Backdrop| Backdrop { film: coarse(&of.film), ..*of };
             let backdrop = self.backdrop.as_ref().map(with_film);
-            let small = Self { session, backdrop, is_whole: false, coarseness: 1, ..*self };
-            let image = small.prepare(developer, cancel)?.image?;
-            return Some(Prepared::of(developer, image.enlarged(every, size)));
+            let other = self.backdrop.as_ref().map(|backdrop| &*backdrop.film);
+            let fine = FineGuides::of(film, other, max_pixels(developer)).map(Arc::new);
+            let is_fine = fine.is_some();
+            let small = Self { session, backdrop, is_whole: false, coarseness: 1, fine, ..*self };
+            let small = small.prepare(developer, cancel)?;
+            let image = small.image.as_ref().filter(|_| !is_fine);
+            let enlarged = image.map(|image| Prepared::of(developer, image.enlarged(every, size)));
+            return Some(enlarged.unwrap_or(small));
         }
         let gpu = &developer.gpu;
         let is_here = |(its, _): &&(Gpu, DeviceFilm)| {
@@ -141,7 +154,7 @@ impl Source {
             {
                 Prepared::on_device(developer.denoised(&noisy(true)))
             }
-            Some(denoiser) => match denoiser.preview(film, other, cancel) {
+            Some(denoiser) => match denoiser.preview(film, other, self.fine.as_deref(), cancel) {
                 Ok(image) => Prepared::of(developer, image?),
                 Err(failure) => Prepared { failure: Some(failure.to_string()), ..raw() },
             },
@@ -202,8 +215,9 @@ pub(super) mod tests {
             let (samples, film) = (other.total_samples(), Arc::new(other));
             let backdrop = Some(Backdrop { film, samples, worth: 4.0 });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
-            let prepared = Source { session, backdrop, denoiser, is_whole, coarseness: 1 }
-                .prepare(&developer, &never);
+            let source =
+                Source { session, backdrop, denoiser, is_whole, coarseness: 1, fine: None };
+            let prepared = source.prepare(&developer, &never);
             let prepared = prepared.expect("not cancelled");
             prepared.image.expect("made on the host").pixels.clone()
         };
@@ -224,7 +238,8 @@ pub(super) mod tests {
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();
             let (backdrop, coarseness) = (None, 1);
-            let source = Source { session, backdrop, denoiser, is_whole: true, coarseness };
+            let source =
+                Source { session, backdrop, denoiser, is_whole: true, coarseness, fine: None };
             let prepared = source.prepare(developer, &AtomicBool::new(false));
             prepared.expect("not cancelled").picture.is_live
         };

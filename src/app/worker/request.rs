@@ -96,6 +96,14 @@ impl Request {
             && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
     }
 
+    /// Whether the same surfaces are seen in the same pixels, whatever they make of light.
+    pub(in crate::app) fn has_surfaces_of(&self, new: &Self) -> bool {
+        let (a, b) = (&self.view, &new.view);
+        self.world.has_same_visibility(&new.world)
+            && (&a.camera, a.width, a.height) == (&b.camera, b.width, b.height)
+            && (a.crop, a.medium) == (b.crop, b.medium)
+    }
+
     /// Whether surfaces look for `self` as they do for `new`, from wherever they are seen.
     pub(in crate::app) fn is_seen_like(&self, new: &Self) -> bool {
         let (a, b) = (&self.view, &new.view);
