@@ -41,8 +41,7 @@ impl CameraArguments {
         if eye == target {
             return Err(Error::new("--eye and --target are the same point"));
         }
-        let fov_y_radians = self.fov_y_radians()?.unwrap_or(0.9);
-        Ok(Some(CameraPlace { eye, target, fov_y_radians }))
+        Ok(Some(CameraPlace { eye, target, fov_y_radians: self.fov_y_radians()?.unwrap_or(0.9) }))
     }
 
     /// A camera with the field of view, if one is named.

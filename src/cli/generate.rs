@@ -50,8 +50,7 @@ pub(super) fn man(arguments: &ManArguments, program: Command) -> Result<()> {
     let write = |command: &Command| {
         let page = Man::new(command.clone());
         let path = folder.join(page.get_filename());
-        let written = write_beside_and_rename(&path, |file| page.render(file));
-        written.map(|()| say_written(&path)).err()
+        write_beside_and_rename(&path, |file| page.render(file)).map(|()| say_written(&path)).err()
     };
     Error::all(with_subcommands(&program).into_iter().filter_map(write).collect())
 }

@@ -164,8 +164,7 @@ impl PictureArguments {
     /// is no picture that has one, as there is none where all hold what was rendered.
     pub(super) fn take_exposure(&mut self, film: &Film, pictures: &[PathBuf]) {
         if !pictures.iter().all(|path| output::holds_layers(path)) {
-            let found = output::exposure_of(&self.options(film), film);
-            self.exposure = found.unwrap_or(self.exposure);
+            self.exposure = output::exposure_of(&self.options(film), film).unwrap_or(self.exposure);
         }
     }
 

@@ -94,9 +94,8 @@ fn line(
     error: Option<RelativeError>,
     cached: (u32, f64),
 ) -> String {
-    let figures = session.figures();
     if session.phase() == Phase::Learning {
-        let (done, total) = (figures.learning_paths, session.view().learning_paths);
+        let (done, total) = (session.figures().learning_paths, session.view().learning_paths);
         return format!("learning {}%", 100 * done / total.max(1));
     }
     let samples = session.samples() + cached.0;

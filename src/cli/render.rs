@@ -105,8 +105,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         Job { world: &world, environment: &environment, phases, notices, uploaded, interrupt };
     match frames {
         None => {
-            let progress = Progress::start("learning");
-            job.render(arguments, camera, None, &progress).and_then(Error::all)
+            job.render(arguments, camera, None, &Progress::start("learning")).and_then(Error::all)
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
@@ -271,8 +270,7 @@ impl Job<'_> {
             cpu.goes_on(&mut driver.session, taken_up).map(|_| ())
         });
         let outcome = begun.and_then(|()| {
-            let pictures = (&mut driver, &mut beside);
-            work(pictures, &mut assignment, &self.interrupt, progress, &mut cpu)
+            work((&mut driver, &mut beside), &mut assignment, &self.interrupt, progress, &mut cpu)
         });
         Ok((assignment, Traced { driver, beside }, outcome))
     }

@@ -184,8 +184,7 @@ impl Environment {
             intensity: self.intensity,
             ..EnvironmentOptions::default()
         };
-        let rotation_turns = self.rotation_turns;
-        Ok(Self { rotation_turns, ..Self::new(map, &options)? })
+        Ok(Self { rotation_turns: self.rotation_turns, ..Self::new(map, &options)? })
     }
 
     /// Turns the map to this angle (finite, radians); nothing is rebuilt.
@@ -434,8 +433,7 @@ impl Environment {
     }
 
     fn radiance_at(&self, point: &MapPoint) -> Vec3 {
-        let corners = self.corners(point.column, point.row);
-        self.scaled(interpolated(corners, point.across, point.down))
+        self.scaled(interpolated(self.corners(point.column, point.row), point.across, point.down))
     }
 
     /// Radiance at the corners of a patch, at intensity 1.

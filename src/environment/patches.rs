@@ -89,8 +89,7 @@ fn is_upper(row: u32, count: u32) -> bool {
 
 /// `1 - cos` of the angle between an edge of rows and a pole, without cancellation.
 fn pole_distance(edge: u32, height: u32, from_upper: bool) -> f64 {
-    let share = (f64::from(edge) - f64::from(SHIFT)) / f64::from(height);
-    let share = share.clamp(0.0, 1.0);
+    let share = ((f64::from(edge) - f64::from(SHIFT)) / f64::from(height)).clamp(0.0, 1.0);
     2.0 * (0.5 * PI * if from_upper { share } else { 1.0 - share }).sin().powi(2)
 }
 

@@ -53,8 +53,7 @@ impl SummedArea {
     pub(crate) fn in_f32(weights: &Weights<'_>) -> Self {
         let (width, height) = weights.size();
         let total = total(weights);
-        let mean = total / (f64::from(width) * f64::from(height));
-        let unit = if total > 0.0 { mean } else { 1.0 };
+        let unit = if total > 0.0 { total / (f64::from(width) * f64::from(height)) } else { 1.0 };
         let (stride, mut corners) = (stride(weights), zero::<f32>(weights));
         let mut first = stride;
         weights.for_each_row(|row| {

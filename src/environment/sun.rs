@@ -85,8 +85,7 @@ pub(crate) fn with_sun(mut map: Image, factor: f32) -> Image {
     for y in 0..map.height {
         let each = texel_solid_angle(map.width, map.height, y);
         let sum = |degrees| {
-            let zero = (DVec3::ZERO, 0.0);
-            cone.row(y, degrees).fold(zero, |(sum, count), x| {
+            cone.row(y, degrees).fold((DVec3::ZERO, 0.0), |(sum, count), x| {
                 (sum + Vec3::from(map.at(x, y)).as_dvec3(), count + 1.0)
             })
         };
@@ -122,8 +121,7 @@ impl SunTexels {
         let cone = Cone::new(map, sun.texel);
         let place = |x, y| (y * map.width + x) as usize;
         let row = |y| cone.row(y, SUN_RADIUS_DEGREES).map(move |x| place(x, y));
-        let texels = (0..map.height).flat_map(row).map(|i| (i, map.pixels[i])).collect();
-        Self { texels }
+        Self { texels: (0..map.height).flat_map(row).map(|i| (i, map.pixels[i])).collect() }
     }
 
     /// Makes the map what it was before any factor.

@@ -96,9 +96,8 @@ fn candidates(part: usize, header: &Header, only_part: bool) -> Vec<Selection> {
         }
     }
     let not_alpha = names.iter().position(|(_, name)| !["a", "alpha"].contains(&name.as_str()));
-    let any = Channels::Grey(not_alpha.unwrap_or(0));
     let rank = if not_alpha.is_some() { 6 } else { 7 };
-    found.push(candidate(rank, "", any));
+    found.push(candidate(rank, "", Channels::Grey(not_alpha.unwrap_or(0))));
     found
 }
 

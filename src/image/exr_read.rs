@@ -42,8 +42,7 @@ pub(crate) fn read_exr(path: &Path) -> Result<FilePicture> {
             Err(failure) if is_patched(&failure) => {
                 let file = patch(read_file(path)?).ok_or_else(|| decode_cause(&failure))?;
                 let reader = ChunkReader::read_from_buffered(Cursor::new(file.bytes), false);
-                let reader = reader.map_err(|e| decode_cause(&e))?;
-                decode(reader, file_bytes, Some(file.sampling))
+                decode(reader.map_err(|e| decode_cause(&e))?, file_bytes, Some(file.sampling))
             }
             Err(failure) => Err(decode_cause(&failure)),
         };
@@ -100,8 +99,7 @@ fn own_attributes(path: &Path) -> Result<LayerAttributes> {
     let read = || MetaData::read_from_buffered(BufReader::new(file), false);
     let meta = guarded(|| read().map_err(|e| decode_cause(&e))).at(path)?;
     let mut headers = meta.headers.into_iter();
-    let first = headers.next().ok_or_else(|| Error::at(path, "has no pictures"))?;
-    Ok(first.own_attributes)
+    Ok(headers.next().ok_or_else(|| Error::at(path, "has no pictures"))?.own_attributes)
 }
 
 /// `sampling` is that of the first part's channels if they may differ from a sample a pixel.
@@ -327,8 +325,7 @@ impl BlockDecoder {
             for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
                 for (i, channel) in self.channels.indices().into_iter().enumerate() {
                     let (sample_type, before) = self.layout[channel];
-                    let row = &row[before * width..];
-                    for_each(sample_type, width, row, |x, v| pixels[x][i] = v);
+                    for_each(sample_type, width, &row[before * width..], |x, v| pixels[x][i] = v);
                 }
             }
             let Vec2(x, y) = block.index.pixel_position;

@@ -85,9 +85,8 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
         line_order: LineOrder::Increasing,
     };
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
-    let file_content = ExrImage::from_layer(layer);
     write_beside_and_rename(path, |file| {
-        write_blocks(&mut *file, &file_content).map_err(|error| match error {
+        write_blocks(&mut *file, &ExrImage::from_layer(layer)).map_err(|error| match error {
             exr::error::Error::Io(error) => error,
             other => io::Error::other(other.to_string()),
         })?;

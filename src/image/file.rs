@@ -79,8 +79,7 @@ fn kept_permissions(file: &File, existing: &Metadata) -> Permissions {
     {
         use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, fchown};
         let group = Some(existing.gid());
-        let kept = fchown(file, Some(existing.uid()), group).or_else(|_| fchown(file, None, group));
-        match kept {
+        match fchown(file, Some(existing.uid()), group).or_else(|_| fchown(file, None, group)) {
             Ok(()) => permissions,
             Err(_) => Permissions::from_mode(permissions.mode() & !0o070),
         }

@@ -43,8 +43,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<FilePicture> {
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
-    let image = header.upright(pixels);
-    Ok(FilePicture { image, notices, is_linear: true, is_cube_map: false })
+    Ok(FilePicture { image: header.upright(pixels), notices, is_linear: true, is_cube_map: false })
 }
 
 /// Most pixels that a byte of new run lengths stands for: 127 in two bytes for each of four channels.
@@ -135,8 +134,7 @@ impl Header {
                 _ => {}
             }
         }
-        let line = text_line(rest).ok_or("has no resolution line")?;
-        let (major, minor) = parse_resolution(&line)?;
+        let (major, minor) = parse_resolution(&text_line(rest).ok_or("has no resolution line")?)?;
         let (columns, rows) = if major.is_y { (minor, major) } else { (major, minor) };
         let (width, height) = check_size(columns.count, rows.count)?;
         Ok(Self { is_xyz, exposure, primaries, major, minor, width, height })

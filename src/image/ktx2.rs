@@ -341,8 +341,7 @@ fn green_from_opacity(pixels: &mut [[u8; 4]]) {
 fn value<'a>(mut metadata: &'a [u8], key: &[u8]) -> &'a [u8] {
     while let Some(length) = word(metadata, 0) {
         let Some(entry) = metadata[4..].get(..length as usize) else { break };
-        let found = entry.strip_prefix(key).and_then(|rest| rest.strip_prefix(b"\0"));
-        if let Some(value) = found {
+        if let Some(value) = entry.strip_prefix(key).and_then(|rest| rest.strip_prefix(b"\0")) {
             return value.strip_suffix(b"\0").unwrap_or(value);
         }
         let next = 4 + (length as usize).next_multiple_of(4);

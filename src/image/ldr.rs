@@ -116,8 +116,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
         (3, true) => Texels::deep(3, &decoded.into_rgb16()),
         (_, true) => Texels::deep(4, &decoded.into_rgba16()),
     };
-    let pixels = pixels.without_opaque_alpha();
-    Ok(LdrImage { width, height, pixels, is_premultiplied: false })
+    Ok(LdrImage { width, height, pixels: pixels.without_opaque_alpha(), is_premultiplied: false })
 }
 
 fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&'a [u8]>>> {

@@ -171,8 +171,7 @@ fn read(path: &Path) -> Result<FilePicture> {
     if looks_like_scene(&start) {
         return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
     }
-    let told = image::guess_format(&start).ok();
-    match (told, extension(path).as_deref()) {
+    match (image::guess_format(&start).ok(), extension(path).as_deref()) {
         (Some(image::ImageFormat::OpenExr), _) => read_exr(path),
         _ if start.starts_with(b"#?") => read_hdr(path),
         (Some(other), _) if !other.reading_enabled() => {
@@ -201,12 +200,10 @@ fn read_developed(path: &Path) -> Result<FilePicture> {
     };
     let pixels = if bits == 8 {
         let linear: Vec<f32> = (0..256).map(|v| linear_from_srgb(v as f32 / 255.0)).collect();
-        let rgb = decoded.into_rgb8();
-        rgb.pixels().map(|p| p.0.map(|v| linear[v as usize])).collect()
+        decoded.into_rgb8().pixels().map(|p| p.0.map(|v| linear[v as usize])).collect()
     } else {
-        let rgb = decoded.into_rgb32f();
         let transfer = if bits == 16 { linear_from_srgb } else { |v| v };
-        rgb.pixels().map(|p| p.0.map(transfer)).collect()
+        decoded.into_rgb32f().pixels().map(|p| p.0.map(transfer)).collect()
     };
     if bits < 32 {
         notices.add(format!("the map is {bits}-bit sRGB: it holds no lights brighter than white"));

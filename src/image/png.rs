@@ -37,8 +37,7 @@ fn encode(
     metadata: &[(String, String)],
 ) -> io::Result<()> {
     let mut encoder = png::Encoder::new(file, picture.width, picture.height);
-    let color = if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb };
-    encoder.set_color(color);
+    encoder.set_color(if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     for (name, value) in metadata {

@@ -150,8 +150,7 @@ fn pixel_words(pixel: &Pixel, skipped: u32) -> [u64; PIXEL_WORDS] {
 /// # Errors
 /// One sentence: the file cannot be read, is something else, or is not whole.
 pub fn read_film(path: &Path) -> Result<(FilmFacts, Film)> {
-    let decoded = read_file(path).and_then(|bytes| decode(&bytes));
-    decoded.at(path)
+    read_file(path).and_then(|bytes| decode(&bytes)).at(path)
 }
 
 /// Reads what a film in a file is of, without the film.

@@ -121,16 +121,14 @@ pub(super) fn render(
         let mut rows: Vec<_> = rows.step_by(pass.coverage.step() as usize).collect();
         // Multiples of the golden ratio lie evenly.
         rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
-        let rows = rows.into_par_iter();
-        return rows.map(|(_, row)| task.render_pixels(row)).reduce(|| (0, 0), add);
+        return rows.into_par_iter().map(|(_, row)| task.render_pixels(row)).reduce(|| (0, 0), add);
     };
     let mut done = (0, 0);
     for sample in film.min_samples()..pass.target {
         if cancel.load(Ordering::Relaxed) {
             break;
         }
-        let seed = pass.sequence.seed(view.seed);
-        let tiling = tile.tiling([film.width, film.height], seed, sample);
+        let tiling = tile.tiling([film.width, film.height], pass.sequence.seed(view.seed), sample);
         let tiles = film.tiles(tile.side, tile.side, tiling.before).into_par_iter();
         let render =
             |(index, pixels)| task.render_tile(tile, tiling.seed_of(index as u32), sample, pixels);

@@ -374,8 +374,7 @@ impl Film {
         let share = |(surface, pixel): (&Surface, &Pixel)| {
             (surface.hits / f64::from(pixel.samples.max(1))).clamp(0.0, 1.0) as f32
         };
-        let pixels = self.surfaces.iter().zip(&self.pixels);
-        self.has_layers().then(|| pixels.map(share).collect())
+        self.has_layers().then(|| self.surfaces.iter().zip(&self.pixels).map(share).collect())
     }
 
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing

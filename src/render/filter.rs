@@ -21,8 +21,7 @@ pub enum PixelFilter {
 impl PixelFilter {
     /// Offset from the pixel's centre in pixels for a point of the unit square.
     pub fn sample(self, u: Vec2) -> Vec2 {
-        let inverted = |table| Vec2::new(invert(table, u.x), invert(table, u.y));
-        self.cumulative().map_or(u - 0.5, inverted)
+        self.cumulative().map_or(u - 0.5, |table| Vec2::new(invert(table, u.x), invert(table, u.y)))
     }
 
     /// Running integral over the filter's width, which [`Self::sample`] inverts; none for a box.

@@ -56,8 +56,7 @@ impl Keyframe {
                 depth => (ray.origin + ray.direction * depth).extend(1.0),
             }
         };
-        let points = depths.par_iter().enumerate().map(point).collect();
-        Some(Self { image, points, frame })
+        Some(Self { image, points: depths.par_iter().enumerate().map(point).collect(), frame })
     }
 
     /// What it shows of each pixel of another view, row after row; `None` where it shows nothing, or only what lies
@@ -93,8 +92,7 @@ impl Keyframe {
             if let Some((far, film)) = &far {
                 let size = Vec2::new(film.width as f32, film.height as f32);
                 let pixel = (middle * size / Vec2::new(width as f32, height as f32)).as_uvec2();
-                let behind = far[(pixel.y * film.width + pixel.x) as usize];
-                if depth_of(key) > GAP * behind {
+                if depth_of(key) > GAP * far[(pixel.y * film.width + pixel.x) as usize] {
                     return None;
                 }
             }

@@ -51,8 +51,7 @@ pub(crate) struct LightFactors {
 
 impl LightFactors {
     fn of_lamp(&self, name: &str) -> f32 {
-        let edit = self.lamp_edits.get(name);
-        self.lamps * edit.map_or(1.0, LampEdit::brightness)
+        self.lamps * self.lamp_edits.get(name).map_or(1.0, LampEdit::brightness)
     }
 
     /// All lights inside a scene times their factors.

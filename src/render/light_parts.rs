@@ -78,8 +78,7 @@ impl LightParts {
             let [in_pixel, in_lens] = [(); 2].map(|()| Vec2::from(camera.next_pair()));
             let ray = rays.ray(pixel + in_pixel, in_lens);
             let found = |tracer: &PathTracer<'_>| {
-                let sampler = Sampler::new(SEED, 1, path);
-                f64::from(luminance(tracer.radiance(ray, sampler).radiance))
+                f64::from(luminance(tracer.radiance(ray, Sampler::new(SEED, 1, path)).radiance))
             };
             let all = by_all.each_ref().map(found);
             let lamps = if has_lamps { by_lamps.each_ref().map(found) } else { [0.0; 3] };
@@ -100,8 +99,7 @@ impl LightParts {
         let mean: f64 = luminance.iter().sum();
         let off = |path: &[f64; 5]| path.iter().sum::<f64>() - mean;
         let covariances = parts.map(|part| {
-            let products = paths.iter().map(|path| (path[part] - luminance[part]) * off(path));
-            products.sum::<f64>() / count
+            paths.iter().map(|path| (path[part] - luminance[part]) * off(path)).sum::<f64>() / count
         });
         let variance: f64 = covariances.iter().sum();
         let noise = covariances.map(|part| if variance > 0.0 { part / variance } else { 0.0 });

@@ -51,8 +51,7 @@ impl SurfaceMap {
 /// The first surface along a camera ray that is mostly not seen through.
 pub(crate) fn look(world: &World, mut ray: Ray) -> Option<Spot> {
     for _ in 0..MAX_PASSES {
-        let hit = world.closest_hit(&ray, true)?;
-        let point = world.point(&hit, ray.direction);
+        let point = world.point(&world.closest_hit(&ray, true)?, ray.direction);
         if world.straight_through(&point, ray.direction).max_element() < 0.5 {
             return Some(Spot {
                 position: point.position,
@@ -67,7 +66,6 @@ pub(crate) fn look(world: &World, mut ray: Ray) -> Option<Spot> {
 
 /// The surface seen at a place of the picture, both coordinates in `[0,1]`.
 pub(crate) fn look_at_place(world: &World, view: &View, place: Vec2) -> Option<Spot> {
-    let rays = view.rays();
     let pixel = place * Vec2::new(view.width as f32, view.height as f32);
-    look(world, rays.ray(pixel, Vec2::splat(0.5)))
+    look(world, view.rays().ray(pixel, Vec2::splat(0.5)))
 }

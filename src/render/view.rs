@@ -186,8 +186,7 @@ impl View {
         [width, height]: [u32; 2],
         samples: Option<u32>,
     ) -> u64 {
-        let pixels = u64::from(width) * u64::from(height);
-        let work = pixels * u64::from(samples.unwrap_or(256));
+        let work = u64::from(width) * u64::from(height) * u64::from(samples.unwrap_or(256));
         if sampling == Sampling::Adaptive {
             (work / ADAPTIVE_LEARNING_SHARE).clamp(1 << 9, 1 << 16)
         } else {
@@ -237,7 +236,6 @@ impl View {
 
     /// The medium that is rendered, in its box; `None` in clear air.
     pub fn fog(&self, world: &World) -> Option<Fog> {
-        let medium = self.medium.or(world.scene.medium)?;
-        Fog::new(&medium, world.bvh.bounds())
+        Fog::new(&self.medium.or(world.scene.medium)?, world.bvh.bounds())
     }
 }

@@ -143,8 +143,7 @@ fn conditions_of(view: &View) -> Conditions {
 fn share_of_targets(tracer: &PathTracer<'_>, view: &View) -> f32 {
     let numbers = PATHS..PATHS + ESTIMATES;
     let found = of_paths(view, numbers, |ray, sampler| tracer.light_of_targets(ray, sampler));
-    let estimates = found.chunks(found.len() / ESTIMATES);
-    let mut shares: Vec<f32> = estimates.map(mean_share).collect();
+    let mut shares: Vec<f32> = found.chunks(found.len() / ESTIMATES).map(mean_share).collect();
     shares.sort_unstable_by(f32::total_cmp);
     shares[ESTIMATES / 2]
 }

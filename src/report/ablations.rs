@@ -116,13 +116,11 @@ fn variants() -> Vec<Method> {
     ] {
         add(group, name, &|s| s.distributions.rendered_paths = rendered_paths);
     }
-    let group = "tiles";
     for (columns, rows) in [(8, 4), (32, 16), (64, 32)] {
-        add(group, &format!("{columns}x{rows} tiles"), &|s| s.tiles = (columns, rows));
+        add("tiles", &format!("{columns}x{rows} tiles"), &|s| s.tiles = (columns, rows));
     }
-    let group = "cells around the horizon";
     for columns in [16, 32, 128] {
-        add(group, &format!("{columns} cells"), &|s| s.grid_columns = columns);
+        add("cells around the horizon", &format!("{columns} cells"), &|s| s.grid_columns = columns);
     }
     let group = "learning paths";
     for paths in [1 << 13, 1 << 16, 1 << 18] {
@@ -138,11 +136,9 @@ fn variants() -> Vec<Method> {
     let group = "shared second vertices";
     add(group, "paths of their own", &|s| s.sharing = Sharing::Off);
     add(group, "squares of 4x4 pixels, all keep theirs", &|s| s.sharing = Sharing::Small);
-    let group = "radiance cache at the second vertex (biased)";
-    add(group, "cached", &|s| s.gi = Gi::Cached);
-    let group = "importance tables";
+    add("radiance cache at the second vertex (biased)", "cached", &|s| s.gi = Gi::Cached);
     for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
-        add(group, &format!("table {table}"), &|s| s.table = table);
+        add("importance tables", &format!("table {table}"), &|s| s.table = table);
     }
     found
 }

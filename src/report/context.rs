@@ -98,8 +98,7 @@ impl Context<'_> {
             format!("{}-{}-{}", state.prepared.title, device.device.title(), method.name);
         let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
         let readable: String = readable.chars().map(plain).collect();
-        let tail = readable.len().saturating_sub(80);
-        format!("{}_{seed}_{digest}", &readable[tail..])
+        format!("{}_{seed}_{digest}", &readable[readable.len().saturating_sub(80)..])
     }
 
     /// Index of the device that renders references: a real GPU that supports the row, or the first that does.

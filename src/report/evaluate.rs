@@ -51,8 +51,7 @@ impl Context<'_> {
             if missing == 0 {
                 return Ok(true);
             }
-            let pictures = reference.facts.pictures + missing;
-            if !self.grow_reference(state, pictures)? {
+            if !self.grow_reference(state, reference.facts.pictures + missing)? {
                 self.evaluate_runs(state)?;
                 return Ok(false);
             }

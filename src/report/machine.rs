@@ -64,8 +64,7 @@ fn processor() -> String {
             let leaves = (NAME..NAME + 3).map(__cpuid);
             let words = leaves.flat_map(|leaf| [leaf.eax, leaf.ebx, leaf.ecx, leaf.edx]);
             let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
-            let name = String::from_utf8_lossy(&bytes);
-            return name.trim_end_matches('\0').trim().to_owned();
+            return String::from_utf8_lossy(&bytes).trim_end_matches('\0').trim().to_owned();
         }
     }
     format!("unnamed {} processor", std::env::consts::ARCH)

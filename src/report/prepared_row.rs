@@ -138,14 +138,12 @@ fn digest_of_picture(lit: Lit<'_>, camera: &Camera, frame: &Frame) -> Result<Dig
     let (world, environment) = lit;
     let digest =
         Digest::new().scene(&world.scene).debug(camera).debug(frame).map(environment.map());
-    let size = PROBE_SIZE;
     let settings = Settings::of(Sampling::Plain);
-    let view = settings.view(camera, &Frame { size, ..frame.clone() }, 0);
+    let view = settings.view(camera, &Frame { size: PROBE_SIZE, ..frame.clone() }, 0);
     let mut session = Session::new(world, environment, view);
     session.advance(PROBE_SAMPLES, &AtomicBool::new(false))?;
     session.settle()?;
-    let probe = session.film().image();
-    Ok(digest.bytes(bytemuck::cast_slice(probe.pixels.as_flattened())))
+    Ok(digest.bytes(bytemuck::cast_slice(session.film().image().pixels.as_flattened())))
 }
 
 const PROBE_SIZE: (u32, u32) = (48, 27);

@@ -220,8 +220,7 @@ impl Report {
 
     /// Names of all methods but the first baseline.
     pub(super) fn other_methods(&self) -> impl Iterator<Item = &str> {
-        let names = self.plan.methods.iter().map(|m| m.name.as_str());
-        names.filter(|name| *name != self.baseline())
+        self.plan.methods.iter().map(|m| m.name.as_str()).filter(|name| *name != self.baseline())
     }
 
     /// The GPU's name, if one was measured.

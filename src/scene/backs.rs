@@ -143,8 +143,7 @@ impl Faces<'_> {
     }
 
     fn hash(&self, face: &Range<usize>) -> u32 {
-        let corners = self.corners(face.clone());
-        let words = corners.into_iter().flatten().map(u64::from);
+        let words = self.corners(face.clone()).into_iter().flatten().map(u64::from);
         hash_of([words.fold(0, mixed), self.scene.owner(face.start) as u64])
     }
 

@@ -118,8 +118,7 @@ impl<const N: usize> Track<N> {
     /// The value at a time, where `between` goes from one key to the next, 0 to 1.
     fn at(&self, seconds: f64, between: fn([f64; N], [f64; N], f64) -> [f64; N]) -> [f64; N] {
         let next = self.times.partition_point(|time| *time <= seconds);
-        let last = self.times.len() - 1;
-        let (key, next) = (next.saturating_sub(1), next.min(last));
+        let (key, next) = (next.saturating_sub(1), next.min(self.times.len() - 1));
         let duration = self.times[next] - self.times[key];
         let t = if duration > 0.0 { (seconds - self.times[key]) / duration } else { 0.0 };
         match self.interpolation {

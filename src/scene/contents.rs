@@ -134,8 +134,7 @@ impl Scene {
             .iter()
             .map(|mesh| {
                 let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
-                let points = mesh.flat_map(corners);
-                let ends = points.map(|point| [point, point]);
+                let ends = mesh.flat_map(corners).map(|point| [point, point]);
                 ends.reduce(|[low, high], [point, _]| [low.min(point), high.max(point)])
             })
             .collect();

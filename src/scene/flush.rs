@@ -124,8 +124,7 @@ impl Scene {
             let own = self.own_triangles().into_par_iter().map(|place| (place as usize, None));
             let meshes = self.instances.meshes();
             let placed = shown.par_iter().flat_map_iter(|it| {
-                let mesh = meshes[it.mesh as usize].clone();
-                mesh.map(|place| (place as usize, Some(&it.placing)))
+                meshes[it.mesh as usize].clone().map(|place| (place as usize, Some(&it.placing)))
             });
             let all = own.chain(placed).filter(move |at: &Surface<'_>| is_passing(at.0) == passing);
             all.map(|surface| self.face(surface))
@@ -291,8 +290,7 @@ impl Scene {
 
 /// Appends the value of a vertex, if vertices have values.
 pub(super) fn again<T: Copy>(values: &mut Vec<T>, vertex: usize) {
-    let value = values.get(vertex).copied();
-    values.extend(value);
+    values.extend(values.get(vertex).copied());
 }
 
 /// How far [`offset_origin`] moves points along a normal, given how far they are from zero along each axis at most.

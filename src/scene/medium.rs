@@ -23,8 +23,7 @@ pub struct Medium {
 impl Medium {
     /// Whether all numbers are in range and the box, if any, has a volume.
     pub fn is_sound(&self) -> bool {
-        let coefficients = [self.scattering, self.absorption];
-        coefficients.iter().all(|c| c.is_finite() && c.min_element() >= 0.0)
+        [self.scattering, self.absorption].iter().all(|c| c.is_finite() && c.min_element() >= 0.0)
             && self.anisotropy.abs() <= 1.0
             && self.bounds.is_none_or(|[low, high]| {
                 low.is_finite() && high.is_finite() && low.cmplt(high).all()

@@ -292,8 +292,7 @@ impl<'a> SurfacePoint<'a> {
             _ => 0.0,
         };
         if parameters.anisotropy > 0.0 {
-            let world = corner.anisotropy_direction(unmapped);
-            let local = shading_frame.local_from_world(world);
+            let local = shading_frame.local_from_world(corner.anisotropy_direction(unmapped));
             parameters.to_mut().anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
         }
         if parameters.clearcoat > 0.0 && material.has_normal_map() {

@@ -56,8 +56,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
         let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
         for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
             // Directed down so that no pixel sees the floor's edge.
-            let eye = Vec3::new(0.3, 1.0, 0.2);
-            let camera = Camera::look_at(eye, Vec3::new(0.0, 0.0, -0.5), 0.6);
+            let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.0, -0.5), 0.6);
             let view = View { width: side, height: side, ..view(camera, Sampling::Plain, 1) };
             let film = render(setting, (&world, &environment), view.clone(), samples)?;
             let found = Deviations::of(luminances(&film), &reference.picture(&view, samples));
@@ -79,9 +78,8 @@ fn against_cpu(setting: &Setting, (builder, camera): (WorldBuilder, Camera)) -> 
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
     let lit = (&world, &environment);
-    let on_cpu = Setting { gpu: None, ..*setting };
     let samples = setting.count(16, 256);
-    let cpu = render(&on_cpu, lit, view.clone(), samples)?;
+    let cpu = render(&Setting { gpu: None, ..*setting }, lit, view.clone(), samples)?;
     let gpu = render(setting, lit, view, samples)?;
     let expected: Vec<f64> = luminances(&cpu).collect();
     let found = Deviations::of(luminances(&gpu), &expected);
@@ -138,8 +136,7 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
     let environment = sky("day")?;
     let uploaded = UploadedScene::new(gpu, &world, &environment)?;
-    let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
-    let small = view(camera, Sampling::Plain, 1);
+    let small = view(Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5), Sampling::Plain, 1);
     let large = View { width: side, height: side, ..small.clone() };
     let refusal = Session::on((&world, &environment), large, Some(&uploaded)).err();
     let refusal = refusal.map(|e| e.to_string()).unwrap_or_default();

@@ -78,8 +78,7 @@ fn leaks_on_axes(setting: &Setting) -> Outcome {
     let count = setting.count(10_000_000, 1_000_000_000);
     let mut outcome = Outcome::default();
     for n in [8_u32, 33] {
-        let tree = cube(n, 1.0);
-        let missed = leaks(&tree, count / 2, |random| {
+        let missed = leaks(&cube(n, 1.0), count / 2, |random| {
             let grid = |random: &mut SplitMix| {
                 (1 + random.below(n as usize - 1)) as f32 / n as f32 * 2.0 - 1.0
             };
@@ -106,8 +105,7 @@ fn leaks_anywhere(setting: &Setting) -> Outcome {
     let count = setting.count(1_000_000, 300_000_000);
     let mut outcome = Outcome::default();
     for size in [1e-4, 1.0, 1e6] {
-        let tree = cube(17, size);
-        let missed = leaks(&tree, count, |random| {
+        let missed = leaks(&cube(17, size), count, |random| {
             (random.next_in_cube() * 0.99 * size, random.next_direction())
         });
         outcome =
@@ -145,9 +143,8 @@ fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
         let axis = point.abs().max_position();
         let mut inward = Vec3::ZERO;
         inward[axis] = -point[axis].signum();
-        let wall = -inward[axis] * tree.bounds().1[axis];
         origin = point;
-        origin[axis] = wall;
+        origin[axis] = -inward[axis] * tree.bounds().1[axis];
         origin = offset_origin(origin, inward);
         direction = random.next_direction();
         direction *= direction.dot(inward).signum();

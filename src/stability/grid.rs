@@ -119,9 +119,8 @@ fn in_the_room(setting: &Setting, scale: f32, center: Vec3, camera: Camera) -> R
 fn camera_inside(setting: &Setting) -> Result<Outcome> {
     let (builder, _) = room(0.7, 1.0, Vec3::ZERO);
     let (low, high) = (Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.5, 1.0, 0.5));
-    let world = builder.faces(&lambert(0.8), low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.25, 0.75, 0.25), Vec3::new(0.5, 0.5, 0.0), 1.0);
-    black(setting, &world, &camera)
+    black(setting, &builder.faces(&lambert(0.8), low, high, 0..6).build(), &camera)
 }
 
 fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {
@@ -160,9 +159,8 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
     builder = lid(builder, [-half, half], [-2.0, -end]);
     builder = lid(builder, [-half, half], [end, 2.0]);
     let world = builder.build();
-    let eye = Vec3::new(0.3, 0.5, 0.2);
     // The pixels cover less of the floor than the slit's width.
-    let camera = Camera::look_at(eye, Vec3::new(0.02, 0.0, 0.1), 1e-4);
+    let camera = Camera::look_at(Vec3::new(0.3, 0.5, 0.2), Vec3::new(0.02, 0.0, 0.1), 1e-4);
     let (strips, mut irradiance) = (2000, 0.0);
     let width = f64::from(half) * 2.0;
     for i in 0..strips {

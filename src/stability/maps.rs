@@ -298,8 +298,7 @@ fn quadrature(environment: &Environment, normal: DVec3, both_sides: bool) -> DVe
             let at_v = v * f64::from(map.height) - 0.5;
             let mut sum = DVec3::ZERO;
             for (x, (sin, cos)) in (0..columns).zip(&azimuths) {
-                let direction = DVec3::new(sin_theta * cos, cos_theta, sin_theta * sin);
-                let cosine = direction.dot(normal);
+                let cosine = DVec3::new(sin_theta * cos, cos_theta, sin_theta * sin).dot(normal);
                 let cosine = if both_sides { cosine.abs() } else { cosine.max(0.0) };
                 if cosine > 0.0 {
                     let at_u = (f64::from(x) + 0.5) / f64::from(fine) - 0.5;

@@ -114,8 +114,7 @@ fn indices(setting: &Setting) -> Result<Outcome> {
         }
         furnaces.add(&furnace(setting, ball(&Material { ior, ..plastic(0.3) }), 64)?);
     }
-    let infinite = Material { ior: 0.0, ..plastic(0.3) };
-    furnaces.add(&furnace(setting, ball(&infinite), 64)?);
+    furnaces.add(&furnace(setting, ball(&Material { ior: 0.0, ..plastic(0.3) }), 64)?);
     Ok(furnaces.judged("index").at_most("index 1 is visible: standard errors", invisible, SIGMAS))
 }
 
@@ -280,8 +279,7 @@ fn overflow(setting: &Setting) -> Result<Outcome> {
     let world = WorldBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();
     let environment = constant(f32::MAX)?;
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 0.3);
-    let view = view(camera, Sampling::Plain, 2);
-    let film = render(setting, (&world, &environment), view, 16)?;
+    let film = render(setting, (&world, &environment), view(camera, Sampling::Plain, 2), 16)?;
     let odd = film.pixels().iter().filter(|p| !p.mean().iter().all(|c| c.is_finite())).count();
     let remarks = crate::output::remarks(&film, &environment);
     let told = remarks.iter().filter(|s| s.contains("not finite")).count();

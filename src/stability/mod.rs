@@ -82,9 +82,8 @@ impl CaseReport {
             "{:<35} {what:<64} {value:>9}  {limit:<12} {verdict:<7} {:>5.1} s",
             self.title, self.seconds
         );
-        let remarks = &self.outcome.remarks;
         if verdict != Verdict::Passed {
-            remarks.iter().for_each(|remark| line += &format!("\n    {remark}"));
+            self.outcome.remarks.iter().for_each(|remark| line += &format!("\n    {remark}"));
         }
         line
     }

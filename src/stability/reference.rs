@@ -28,8 +28,7 @@ impl<'a> FloorReference<'a> {
     /// `None` for a black map.
     pub(super) fn new(environment: &'a Environment, albedo: f64) -> Option<Self> {
         let grid = LightGrid::whole_map(environment.tile_energies())?;
-        let energy = environment.tile_energies().iter().sum();
-        Some(Self { environment, grid, albedo, energy })
+        Some(Self { environment, grid, albedo, energy: environment.tile_energies().iter().sum() })
     }
 
     /// Mean luminance of each pixel over its first `samples` samples.

@@ -316,8 +316,7 @@ impl RenderArguments {
         if (fog, fog_absorption, fog_anisotropy, fog_box) == (&None, &None, &None, &None) {
             return None;
         }
-        let frame = scene.frame;
-        let asked = frame.medium(Medium {
+        let asked = scene.frame.medium(Medium {
             scattering: fog.unwrap_or_default(),
             absorption: fog_absorption.unwrap_or_default(),
             anisotropy: 0.0,

@@ -77,8 +77,7 @@ impl<'a> Frames<'a> {
         let world_from_camera = match self.motion {
             Motion::Path(path) => {
                 let placed = path.at(f64::from(frame) / self.frames_per_second);
-                let is_sound = placed.is_finite();
-                if is_sound { placed.as_affine3a() } else { at_rest.world_from_camera }
+                if placed.is_finite() { placed.as_affine3a() } else { at_rest.world_from_camera }
             }
             Motion::Turn { about, count } => {
                 let turn = std::f64::consts::TAU * f64::from(frame) / f64::from(count);
@@ -174,8 +173,7 @@ fn try_ffmpeg(codec: &str) -> std::result::Result<(), String> {
 
 /// The last line of what a program says.
 fn said(text: &[u8]) -> String {
-    let text = String::from_utf8_lossy(text);
-    text.lines().last().unwrap_or("no reason given").to_owned()
+    String::from_utf8_lossy(text).lines().last().unwrap_or("no reason given").to_owned()
 }
 
 /// A folder for the frames of a video, gone when this value is.
@@ -243,9 +241,8 @@ impl Reel {
         if !output.status.success() {
             return Err(Error::at(path, format!("ffmpeg failed: {}", said(&output.stderr))));
         }
-        let made = self.folder.join(made);
         write_beside_and_rename(path, |file| {
-            io::copy(&mut fs::File::open(&made)?, file).map(|_| ())
+            io::copy(&mut fs::File::open(self.folder.join(made))?, file).map(|_| ())
         })?;
         say_written(path);
         Ok(())

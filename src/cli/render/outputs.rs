@@ -70,8 +70,7 @@ fn files(arguments: &RenderArguments) -> impl Iterator<Item = &PathBuf> {
 
 /// Files that are there already and would be written over, each frame's among them.
 pub(super) fn overwritten(arguments: &RenderArguments) -> Vec<PathBuf> {
-    let turn = arguments.turntable.map(|count| 0..=count - 1);
-    let numbers = arguments.frames.clone().or(turn);
+    let numbers = arguments.frames.clone().or(arguments.turntable.map(|count| 0..=count - 1));
     let of_frames = |path: &PathBuf| match &numbers {
         Some(numbers) => {
             let name = |number| frames::numbered(path, number);

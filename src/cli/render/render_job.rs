@@ -227,8 +227,7 @@ impl RenderJob {
                 ..figures
             };
         }
-        let facts = self.facts(driver.target, figures, record.metadata());
-        write_film(path, &facts, record.film, 0)
+        write_film(path, &self.facts(driver.target, figures, record.metadata()), record.film, 0)
     }
 
     fn facts(&self, target: u32, figures: Figures, metadata: Vec<(String, String)>) -> FilmFacts {

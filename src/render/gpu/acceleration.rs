@@ -63,14 +63,12 @@ impl Acceleration {
         }
         let most = gpu.limits.max_blas_primitive_count;
         if let Some(Lower { count, .. }) = lower.iter().find(|lower| lower.count > most) {
-            let sentence = format!("{count} triangles: {name}'s ray queries take {most}");
-            return Err(Error::new(sentence));
+            return Err(Error::new(format!("{count} triangles: {name}'s ray queries take {most}")));
         }
         let count = scene.instances.len();
         let most = MAX_INSTANCES.min(gpu.limits.max_tlas_instance_count as usize - 1);
         if count > most {
-            let sentence = format!("{count} instances: {name}'s ray queries take {most}");
-            return Err(Error::new(sentence));
+            return Err(Error::new(format!("{count} instances: {name}'s ray queries take {most}")));
         }
         let of_mesh = |mesh: u32| &lower[mesh as usize + 1];
         let mut instances = world.bvh.instance_words(|mesh| of_mesh(mesh).first);

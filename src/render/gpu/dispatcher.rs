@@ -179,8 +179,7 @@ impl Dispatcher {
     /// Compiles kernels, all of them at once: a real GPU's driver takes seconds for each.
     pub(super) fn compile(&mut self, kernels: &[Kernel]) -> Result<()> {
         let start = Instant::now();
-        let compiled = self.gpu.pipelines(self.programs(kernels))?;
-        self.take_up(kernels, compiled);
+        self.take_up(kernels, self.gpu.pipelines(self.programs(kernels))?);
         self.compile_seconds += start.elapsed().as_secs_f64();
         Ok(())
     }

@@ -294,7 +294,6 @@ impl Features {
 
     /// Light that comes through undiffused.
     pub(super) fn transmission(&self) -> bool {
-        let transmits = SceneFeatures::THIN_TRANSMISSION | SceneFeatures::SOLID_TRANSMISSION;
-        self.scene.intersects(transmits)
+        self.scene.intersects(SceneFeatures::THIN_TRANSMISSION | SceneFeatures::SOLID_TRANSMISSION)
     }
 }

@@ -36,8 +36,7 @@ pub(super) fn trace_anywhere(
         first += count;
     }
     on.settle()?;
-    let rays = on.read_words("learning_rays", 1)?.first().copied();
-    Ok((first, rays.map_or(0, u64::from)))
+    Ok((first, on.read_words("learning_rays", 1)?.first().copied().map_or(0, u64::from)))
 }
 
 /// Uploads counters, to be counted on.

@@ -130,8 +130,7 @@ impl Renderer {
         learns: bool,
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(uploaded, lit, asked)?;
-        let kernels = renderer.own_kernels(learns);
-        renderer.dispatcher.compile(&kernels)?;
+        renderer.dispatcher.compile(&renderer.own_kernels(learns))?;
         Ok(renderer)
     }
 

@@ -182,8 +182,7 @@ pub(super) fn put_lights(
     globals: &mut Globals,
     lights: &LocalLights,
 ) -> Result<()> {
-    let words = layout::light_words(lights, globals);
-    put_array(buffers, "lights", "the list of lights", &words)?;
+    put_array(buffers, "lights", "the list of lights", &layout::light_words(lights, globals))?;
     put_array(buffers, "light_nodes", "the tree of lights", &layout::light_nodes(lights))
 }
 

@@ -27,8 +27,7 @@ pub(super) fn advance(
         if progress.group == 0 {
             let units = on.flights.units(Kernel::Render);
             let affordable = units / u64::from(missing.min(MAX_SAMPLES));
-            let count = affordable.clamp(on.min_tiles(units), MAX_GROUPS);
-            progress.group = count.min(tiles - first);
+            progress.group = affordable.clamp(on.min_tiles(units), MAX_GROUPS).min(tiles - first);
         }
         let count = progress.group;
         while progress.group_samples < missing {

@@ -162,8 +162,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let renderer = gpu::Renderer::new(uploaded, lit, self.state.asked(), learns)?;
-        self.move_to(renderer)
+        self.move_to(gpu::Renderer::new(uploaded, lit, self.state.asked(), learns)?)
     }
 
     /// [`Self::continue_on_gpu`] if that need not wait for kernels. Otherwise a thread compiles them, which holds what
@@ -386,8 +385,7 @@ impl<'a> Session<'a> {
                 let tracer = state.tracer(lit, Some(counted));
                 let rays = cpu::learn(&tracer, &state.view, range.clone(), cancel);
                 if cancel.load(Ordering::Relaxed) {
-                    let learning = Learning::new(lit, &state.view);
-                    state.tiles.begin_again(learning, &mut state.figures);
+                    state.tiles.begin_again(Learning::new(lit, &state.view), &mut state.figures);
                     return self.take_up_distributions();
                 }
                 rays
@@ -475,8 +473,7 @@ impl<'a> Session<'a> {
     /// Brings the pixels of a pass `samples` further. Making distributions counts as learning.
     fn render(&mut self, samples: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
         let (start, figures) = (Instant::now(), self.state.figures);
-        let target = self.state.samples.saturating_add(samples);
-        let result = self.pass(target, coverage, cancel);
+        let result = self.pass(self.state.samples.saturating_add(samples), coverage, cancel);
         let distributions = self.state.figures.distribution_seconds - figures.distribution_seconds;
         self.state.figures.learning_seconds += distributions;
         let samples = self.state.figures.samples - figures.samples;

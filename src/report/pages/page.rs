@@ -124,8 +124,7 @@ impl<'a> Pictures<'a> {
             for (_, name, picture) in row.pictures.runs.iter().filter(|(d, ..)| *d == device.device)
             {
                 if let Some(method) = device.method(name) {
-                    let crop = window.of(&developed(picture, reference));
-                    of_device.push((method, data_uri(&crop)?));
+                    of_device.push((method, data_uri(&window.of(&developed(picture, reference)))?));
                 }
             }
             if !of_device.is_empty() {

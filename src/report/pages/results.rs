@@ -38,8 +38,7 @@ impl<'a> Table<'a> {
             cell.filter(|text| !text.is_empty()).unwrap_or_else(|| "-".to_owned())
         }));
         if self.is_beside_talk {
-            let published = row.row.published_on(device.device);
-            cells.push(published.map_or_else(|| "-".to_owned(), ratio));
+            cells.push(row.row.published_on(device.device).map_or_else(|| "-".to_owned(), ratio));
             cells.push(match (row.row.target, device.adaptive_speed_up(baseline)) {
                 (Some(target), Some(found)) => format!("{target}: {}", verdict(found, target)),
                 (Some(target), None) => target.to_string(),

@@ -75,8 +75,7 @@ pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
         let (s, c) = (k as f32 * 0.9).sin_cos();
         let foot = Vec3::new(-0.018 * c, 0.008, -0.018 * s);
         let tip = Vec3::new(0.034 * c, stream.between(0.15, 0.19), 0.034 * s);
-        let tone = COVERS[stream.index(COVERS.len())];
-        b.tinted(tone, |b| {
+        b.tinted(COVERS[stream.index(COVERS.len())], |b| {
             b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)]);
         });
     }

@@ -123,8 +123,7 @@ fn shell(b: &mut Builder, m: &Palette) {
 }
 
 fn window(b: &mut Builder, m: &Palette) {
-    let wall = room::walls(SIZE)[1];
-    b.part(wall.frame(), |b| {
+    b.part(room::walls(SIZE)[1].frame(), |b| {
         fittings::window_frame(b, m.white, WINDOW, 0.12, [3, 2], 0.004);
         fittings::window_board(b, m.white, WINDOW, THICKNESS);
         let [u0, v0, u1, _] = WINDOW;
@@ -147,8 +146,7 @@ fn window(b: &mut Builder, m: &Palette) {
 }
 
 fn pictures(b: &mut Builder, m: &Palette) {
-    let wall = room::walls(SIZE)[2];
-    b.part(wall.frame(), |b| {
+    b.part(room::walls(SIZE)[2].frame(), |b| {
         for (frame, art, [u, v, w, h]) in [
             (m.brass, m.arts[0], [1.80, 1.32, 0.72, 0.94]),
             (m.walnut, m.arts[1], [3.22, 1.62, 0.46, 0.60]),

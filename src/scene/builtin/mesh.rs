@@ -197,8 +197,7 @@ impl Builder {
             let (b, c) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
             for side in [0, 1 << axis] {
                 let face = [side, side | b, side | b | c, side | c].map(|k| at(k, axis));
-                let corners = face.map(|(p, n)| (p, n, uv(p, axis)));
-                self.polygon(mat, &corners, face[0].1);
+                self.polygon(mat, &face.map(|(p, n)| (p, n, uv(p, axis))), face[0].1);
             }
             if bevel <= 0.0 {
                 continue;
@@ -208,8 +207,7 @@ impl Builder {
                 let (near, far) = (sb | sc, sb | sc | 1 << axis);
                 let (ib, ic) = ((axis + 1) % 3, (axis + 2) % 3);
                 let edge = [at(near, ib), at(far, ib), at(far, ic), at(near, ic)];
-                let corners = edge.map(|(p, n)| (p, n, uv(p, ib)));
-                self.polygon(mat, &corners, edge[0].1 + edge[2].1);
+                self.polygon(mat, &edge.map(|(p, n)| (p, n, uv(p, ib))), edge[0].1 + edge[2].1);
             }
         }
         if bevel > 0.0 {

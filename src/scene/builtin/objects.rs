@@ -123,8 +123,7 @@ pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
     let mut profile = vec![(0.0, 0.0), (radii[0] * height - 0.002, 0.0)];
     let share = |k: u32| k as f32 / STEPS as f32;
     profile.extend((0..=STEPS).map(share).map(|t| (radius(t) * height, 0.003 + t * height)));
-    let top = radius(1.0) * height;
-    profile.push((top - 0.3 * wall * height, 0.003 + height * 1.004));
+    profile.push((radius(1.0) * height - 0.3 * wall * height, 0.003 + height * 1.004));
     let inside = (3..=STEPS).rev().map(share);
     profile.extend(inside.map(|t| ((radius(t) - wall) * height, t * height)));
     profile.push((0.0, 0.06 * height));
@@ -200,8 +199,7 @@ pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f3
         b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
     });
     for hour in 0..12 {
-        let turn = Affine3A::from_rotation_z(hour as f32 * TAU / 12.0);
-        b.part(turn, |b| {
+        b.part(Affine3A::from_rotation_z(hour as f32 * TAU / 12.0), |b| {
             b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0);
         });
     }

@@ -78,8 +78,7 @@ pub(super) fn build() -> Scene {
 
 fn shell(b: &mut Builder, m: &Palette) {
     let mats = [m.wall, m.wall, m.feature, m.wall, m.boards, m.ceiling];
-    let windows = WINDOWS.map(Hole::Rectangle);
-    room::room(b, mats, SIZE, THICKNESS, [&windows, &[], &[], &[]]);
+    room::room(b, mats, SIZE, THICKNESS, [&WINDOWS.map(Hole::Rectangle), &[], &[], &[]]);
     let walls = room::walls(SIZE);
     fittings::edges(b, &walls, [m.white, m.ceiling], SIZE[1], [0.33, 1.37], [0.10, 0.07]);
     b.part(walls[0].frame(), |b| {
@@ -105,8 +104,7 @@ fn shell(b: &mut Builder, m: &Palette) {
 }
 
 fn wall_things(b: &mut Builder, m: &Palette) {
-    let wall = room::walls(SIZE)[2];
-    b.part(wall.frame(), |b| {
+    b.part(room::walls(SIZE)[2].frame(), |b| {
         let places = [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]];
         for (art, [u, v, w, h]) in m.arts.into_iter().zip(places) {
             b.moved([u, v, 0.0], |b| objects::picture(b, [m.oak, m.white, art], [w, h], 0.06));

@@ -70,9 +70,8 @@ pub(super) fn blades(b: &mut Builder, mat: Mat, count: u32, height: f32, seed: u
         let out = outward(i as f32 * 2.4 + stream.between(-0.3, 0.3));
         let lean = stream.between(0.05, 0.32);
         let h = height * stream.between(0.6, 1.0);
-        let tone = GREENS[stream.index(GREENS.len())];
         b.part(growing(out * (0.02 + 0.1 * lean * height), Vec3::Y + out * lean), |b| {
-            b.tinted(tone, |b| {
+            b.tinted(GREENS[stream.index(GREENS.len())], |b| {
                 leaf(b, mat, [h, 0.14 * height.sqrt() * 0.6], stream.between(-0.25, 0.25), [4, 10]);
             });
         });
@@ -89,13 +88,11 @@ pub(super) fn big_leaves(b: &mut Builder, mat: Mat, count: u32, height: f32, see
         let reach = height * (0.10 + 0.30 * t) * stream.between(0.8, 1.2);
         let tip = out * reach + Vec3::Y * top;
         let knee = out * (0.25 * reach) + Vec3::Y * (0.6 * top);
-        let tone = GREENS[stream.index(GREENS.len())];
-        b.tinted(tone, |b| {
+        b.tinted(GREENS[stream.index(GREENS.len())], |b| {
             let path: Vec<(Vec3, f32)> = (0..=8)
                 .map(|k| {
                     let f = k as f32 / 8.0;
-                    let p = (knee * (2.0 * f * (1.0 - f))) + tip * (f * f);
-                    (p, 0.0075 - 0.004 * f)
+                    ((knee * (2.0 * f * (1.0 - f))) + tip * (f * f), 0.0075 - 0.004 * f)
                 })
                 .collect();
             b.tube(mat, 7, &path);
@@ -116,8 +113,7 @@ pub(super) fn trailing(b: &mut Builder, mat: Mat, radius: f32, length: f32, seed
         let drop = length * stream.between(0.35, 1.0);
         let reach = radius * stream.between(1.15, 1.5);
         let at = |f: f32| {
-            let over = smoothstep(0.0, 0.3, f);
-            out * (reach * over)
+            out * (reach * smoothstep(0.0, 0.3, f))
                 + Vec3::Y
                     * (0.05 * (1.0 - (2.0 * f - 0.3).powi(2)) - drop * (f - 0.2).max(0.0) / 0.8)
         };
@@ -178,8 +174,7 @@ pub(super) fn foliage(
         let wander =
             Vec3::new(stream.between(-1., 1.), stream.between(-1., 0.6), stream.between(-1., 1.));
         let length = size * stream.between(0.7, 1.3);
-        let tone = GREENS[stream.index(GREENS.len())];
-        b.tinted(tone, |b| {
+        b.tinted(GREENS[stream.index(GREENS.len())], |b| {
             b.part(growing(at, out + wander), |b| {
                 leaf(b, mat, [length, 0.6 * length], 0.6, [2, 2]);
             });

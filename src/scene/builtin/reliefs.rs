@@ -58,8 +58,7 @@ pub(super) fn herringbone(size: Vec2) -> TextureImage {
 /// Of `textures::plaster`: traces of the trowel.
 pub(super) fn plaster(size: Vec2) -> TextureImage {
     relief(256, 256, size, |uv| {
-        let trowel = tiling_fbm(uv * Vec2::new(9.0, 14.0), IVec2::new(9, 14), 5, 23);
-        8e-3 * trowel
+        8e-3 * tiling_fbm(uv * Vec2::new(9.0, 14.0), IVec2::new(9, 14), 5, 23)
     })
 }
 

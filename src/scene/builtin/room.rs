@@ -162,8 +162,7 @@ fn round_hole(b: &mut Builder, mat: Mat, [u, v, r]: [f32; 3], thickness: f32) {
             b.polygon(mat, &[corners[0], corners[2], corners[3]], outward);
         }
         let at = |n: Vec3, z: f32| {
-            let p = centre + n * r + Vec3::Z * z;
-            (p, -n, Vec2::new(z, n.y.atan2(n.x) / TAU * r))
+            (centre + n * r + Vec3::Z * z, -n, Vec2::new(z, n.y.atan2(n.x) / TAU * r))
         };
         b.polygon(
             mat,

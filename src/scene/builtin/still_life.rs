@@ -27,10 +27,8 @@ pub(super) fn build() -> Scene {
             translucent(b);
         });
     });
-    let place = |p: [f32; 3]| {
-        let turn = glam::Quat::from_rotation_y(TURN.to_radians());
-        (turn * Vec3::from(p)).to_array()
-    };
+    let turn = glam::Quat::from_rotation_y(TURN.to_radians());
+    let place = |p: [f32; 3]| (turn * Vec3::from(p)).to_array();
     b.camera("still life", place([0.16, 1.34, 2.78]), place([0.0, 0.97, 0.0]), 23.0);
     b.finish()
 }

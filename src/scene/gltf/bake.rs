@@ -62,9 +62,8 @@ fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     let bytes = |triangles: usize, vertices: usize| {
         TRIANGLE_BYTES * triangles as u64 + VERTEX_BYTES * vertices as u64
     };
-    let present = bytes(scene.triangles.len(), scene.positions.len());
     let added = bytes(part.triangles.len(), part.positions.len()).saturating_mul(copies as u64);
-    check_growth(present, added)?;
+    check_growth(bytes(scene.triangles.len(), scene.positions.len()), added)?;
     // Three per triangle, unless most triangles of a part were dropped; far below 2^32.
     let vertices = total(scene.positions.len(), part.positions.len());
     check_count(vertices, 3 * MAX_TRIANGLES, WITH_INSTANCES, "vertices")

@@ -156,8 +156,7 @@ impl<'a> File<'a> {
 
     /// Bytes of all buffers that can be read together.
     pub(super) fn total_bytes(&self) -> usize {
-        let indices = self.document.buffers.indices();
-        let buffers = indices.filter_map(|index| self.buffer(index).ok());
+        let buffers = self.document.buffers.indices().filter_map(|index| self.buffer(index).ok());
         // Several may be of one file.
         let lengths: BTreeMap<_, _> = buffers.map(|bytes| (bytes.as_ptr(), bytes.len())).collect();
         lengths.values().sum()
@@ -187,8 +186,7 @@ impl<'a> File<'a> {
 
     /// Some bytes of a buffer.
     fn range(&self, number: usize, begin: u64, length: u64) -> Fallible<&[u8]> {
-        let index = Index::new(u32::try_from(number).unwrap_or(u32::MAX));
-        let buffer = self.buffer(index)?;
+        let buffer = self.buffer(Index::new(u32::try_from(number).unwrap_or(u32::MAX)))?;
         let end = begin.checked_add(length).and_then(|end| usize::try_from(end).ok());
         let range = usize::try_from(begin).ok().zip(end);
         range.and_then(|(begin, end)| buffer.get(begin..end)).ok_or_else(|| {

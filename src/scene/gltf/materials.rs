@@ -49,8 +49,7 @@ impl Materials {
                 None => Material { name: "default".to_owned(), ..Material::default() },
                 Some(number) => {
                     let source = file.document.materials.get(json::Index::new(number))?;
-                    let name = source.name.clone();
-                    let name = name.unwrap_or_else(|| format!("material {number}"));
+                    let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
                     let mut reader = Reader {
                         document: &file.document,
                         material: Material { name, ..Material::default() },

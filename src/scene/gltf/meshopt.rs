@@ -24,8 +24,7 @@ impl Packed {
         let Some(extension) = names.iter().find_map(|name| extensions.others.get(*name)) else {
             return Ok(None);
         };
-        let packed = Self::deserialize(extension as &Value);
-        packed
+        Self::deserialize(extension as &Value)
             .map(Some)
             .map_err(|cause| format!("its meshopt compression makes no sense ({cause})"))
     }

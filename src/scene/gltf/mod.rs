@@ -97,8 +97,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
 /// # Errors
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
-    let options = SceneOptions::default();
-    let mut scene = read(bytes, base_dir, &options).at(name)?;
+    let mut scene = read(bytes, base_dir, &SceneOptions::default()).at(name)?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
@@ -139,8 +138,7 @@ fn read_in(
     let mut nodes = Nodes::new(document, DAffine3::IDENTITY, &mut notices)?;
     let mut placements = placements(&file, &nodes)?;
     let is_known = frame.is_some();
-    let suiting = || bounds(&file, &nodes, &placements).map(Frame::suiting);
-    let frame = frame.map_or_else(suiting, Ok)?;
+    let frame = frame.map_or_else(|| bounds(&file, &nodes, &placements).map(Frame::suiting), Ok)?;
     if !frame.is_identity() {
         // Again, from where f32 is exact enough; what there was to be said has been said.
         nodes = Nodes::new(document, frame.transform(), &mut Notices::default())?;

@@ -26,9 +26,8 @@ impl Part {
     /// Bytes that it takes, about.
     pub(super) fn bytes(&self) -> u64 {
         const BYTES_OF_VERTEX: usize = 72;
-        let influences = size_of_val(&self.influences[..]);
         let bytes = size_of_val(&self.triangles[..]) + BYTES_OF_VERTEX * self.positions.len();
-        (bytes + influences) as u64
+        (bytes + size_of_val(&self.influences[..])) as u64
     }
 
     /// Appends a copy of a vertex and returns its number.

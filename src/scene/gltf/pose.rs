@@ -329,8 +329,7 @@ pub(super) fn joint_transforms(
     }
     let transform = |(joint, &node): (usize, &Index<json::Node>)| {
         let bind = inverse_bind.as_ref().map_or(DAffine3::IDENTITY, |matrices| {
-            let columns = matrices.floats(joint).map(f64::from);
-            DAffine3::from_mat4(DMat4::from_cols_array(&columns))
+            DAffine3::from_mat4(DMat4::from_cols_array(&matrices.floats(joint).map(f64::from)))
         });
         nodes.world(node) * bind
     };

@@ -125,8 +125,7 @@ impl<'a> Source<'a> {
     fn find(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Found<'a>>> {
         let accessor = self.primitive.attributes.get(&Checked::Valid(semantic.clone()));
         let open = |&accessor| {
-            let elements = open(self.file, self.draco.as_ref(), semantic, accessor, types)?;
-            Ok((accessor, elements))
+            Ok((accessor, open(self.file, self.draco.as_ref(), semantic, accessor, types)?))
         };
         accessor.map(open).transpose()
     }
@@ -178,8 +177,7 @@ impl<'a> Source<'a> {
 
     /// Positions of some vertices.
     pub(super) fn positions(&self) -> Vec<Vec3> {
-        let vertices = self.vertices.iter();
-        vertices.map(|&v| Vec3::from_array(self.positions.floats(v as usize))).collect()
+        self.vertices.iter().map(|&v| Vec3::from_array(self.positions.floats(v as usize))).collect()
     }
 
     /// Unit normals, zero (and counted) where they cannot be used.
@@ -210,8 +208,7 @@ impl<'a> Source<'a> {
 
     /// Linear colours with alpha; empty if there are none.
     pub(super) fn colors(&mut self) -> Fallible<Vec<Vec4>> {
-        let types = [Type::Vec3, Type::Vec4];
-        let Some(elements) = self.optional(&Semantic::Colors(0), &types)? else {
+        let Some(elements) = self.optional(&Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? else {
             return Ok(Vec::new());
         };
         let elements = elements.with_fractions();

@@ -93,8 +93,7 @@ fn welded(parts: &[Part]) -> (Vec<Vec3>, Vec<Vec<[u32; 3]>>) {
         .map(|part| {
             let mut number = |vertex: u32| {
                 let position = part.positions[vertex as usize];
-                let key = (position / cell).round().as_ivec3();
-                *numbers.entry(key).or_insert_with(|| {
+                *numbers.entry((position / cell).round().as_ivec3()).or_insert_with(|| {
                     corners.push(position);
                     corners.len() as u32 - 1
                 })

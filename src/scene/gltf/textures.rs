@@ -133,8 +133,7 @@ impl Decoded {
         let Some(reference) = slot else { return };
         let glossy = (reference.texture, factor.to_bits());
         let known = self.rough.get(&glossy).copied();
-        let made = known.or_else(|| self.rough_texture(reference.texture, factor));
-        let Some(rough) = made else {
+        let Some(rough) = known.or_else(|| self.rough_texture(reference.texture, factor)) else {
             // It is the same everywhere, or there is no memory for it.
             *slot = None;
             return;

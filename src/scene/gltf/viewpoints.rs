@@ -76,8 +76,7 @@ fn camera(
         (perspective, _) => {
             let fov = perspective.as_ref().map(|it| it.yfov);
             let fov = fov.filter(|fov| *fov > 0.0 && *fov < PI);
-            let fov_y_radians = fov.unwrap_or(DEFAULT_FOV_Y_RADIANS);
-            (fov, Projection::Perspective { fov_y_radians })
+            (fov, Projection::Perspective { fov_y_radians: fov.unwrap_or(DEFAULT_FOV_Y_RADIANS) })
         }
     };
     if size.is_none() || !world_from_camera.is_finite() {
