@@ -14,10 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use super::options::{EnvironmentOptions, TableKind};
 use super::statistics::check_size;
-use super::summed_area::SummedArea;
 use super::table::Table;
-use super::tile_local::TileLocal;
-use super::tiles::{TileGrid, TilePatches};
+use super::tiles::TileGrid;
 use super::weights::Weights;
 use crate::error::Result;
 use crate::image::Image;
@@ -94,8 +92,7 @@ pub fn sat_report(map: &Image, timed_samples: u32) -> Result<SatReport> {
         let start = Instant::now();
         let (table, energies) = Table::build(kind, &weights, &grid);
         let build_seconds = start.elapsed().as_secs_f64();
-        let distribution = Distribution::new(&table, &grid, &energies);
-        let deviation = Deviation::of(&distribution, &weights, total);
+        let deviation = Deviation::of(&probabilities(&table, &grid, &energies), &weights, total);
         SatReportRow {
             table: kind,
             mean_squared_error: deviation.squares * patches,
@@ -128,7 +125,7 @@ struct Deviation {
 
 impl Deviation {
     /// Of the whole map; rows are added in order, so that the result does not depend on threads.
-    fn of(distribution: &Distribution<'_>, weights: &Weights<'_>, total: f64) -> Self {
+    fn of(probabilities: &OfRow<'_>, weights: &Weights<'_>, total: f64) -> Self {
         let (width, height) = weights.size();
         let rows: Vec<Self> = (0..height)
             .into_par_iter()
@@ -136,7 +133,8 @@ impl Deviation {
                 || (vec![0.0; width as usize], Vec::new()),
                 |(row, scratch), y| {
                     weights.row(0, y, row, scratch);
-                    Self::of_row(row, &distribution.sampled(y), &distribution.reported(y), total)
+                    let [sampled, reported] = probabilities(y);
+                    Self::of_row(row, &sampled, &reported, total)
                 },
             )
             .collect();
@@ -165,55 +163,36 @@ impl Deviation {
     }
 }
 
-/// The probabilities with which a table samples the whole map, row by row.
-enum Distribution<'a> {
-    TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
-    SummedArea { table: &'a SummedArea, whole: TilePatches, row_probabilities: Vec<f64> },
-}
+/// What finds the probabilities of the patches of a row: those with which they are sampled, and those that are
+/// reported, negative where sums fall.
+type OfRow<'a> = Box<dyn Fn(u32) -> [Vec<f64>; 2] + Sync + 'a>;
 
-impl<'a> Distribution<'a> {
-    fn new(table: &'a Table, grid: &'a TileGrid, energies: &[f64]) -> Self {
-        match table {
-            Table::TileLocal(table) => {
-                let total: f64 = energies.iter().sum();
-                let share = |energy: &f64| if total > 0.0 { energy / total } else { 0.0 };
-                let tile_probabilities = energies.iter().map(share).collect();
-                Self::TileLocal { table, grid, tile_probabilities }
-            }
-            Table::SummedArea(table) => {
-                let whole = grid.whole();
-                let row_probabilities = table.row_distribution(&whole);
-                Self::SummedArea { table, whole, row_probabilities }
-            }
-        }
-    }
-
-    /// Probabilities with which the patches of row `y` are sampled.
-    fn sampled(&self, y: u32) -> Vec<f64> {
-        match self {
-            // Exact sums: each entry is sampled with its reported probability.
-            Self::TileLocal { .. } => self.reported(y),
-            Self::SummedArea { table, whole, row_probabilities } => {
-                let columns = table.column_distribution(whole, y);
-                columns.iter().map(|column| column * row_probabilities[y as usize]).collect()
-            }
-        }
-    }
-
-    /// Probabilities that the table reports for the patches of row `y`; negative where sums fall.
-    fn reported(&self, y: u32) -> Vec<f64> {
-        match self {
-            Self::TileLocal { table, grid, tile_probabilities } => (grid.whole().x)
-                .map(|x| {
+/// The probabilities with which a table samples the whole map, and those that it reports, row by row.
+fn probabilities<'a>(table: &'a Table, grid: &'a TileGrid, energies: &[f64]) -> OfRow<'a> {
+    let share = |part: f64, total: f64| if total > 0.0 { part / total } else { 0.0 };
+    let whole = grid.whole();
+    match table {
+        Table::TileLocal(table) => {
+            let total = energies.iter().sum();
+            let of_tiles: Vec<f64> = energies.iter().map(|energy| share(*energy, total)).collect();
+            Box::new(move |y| {
+                let of_patch = |x| {
                     let tile = grid.tile_of_patch(x, y);
-                    tile_probabilities[tile as usize] * table.sample_probability(tile, x, y)
-                })
-                .collect(),
-            Self::SummedArea { table, whole, .. } => {
-                let total = table.mass(&whole.x, &whole.y);
-                let share = |mass: f64| if total > 0.0 { mass / total } else { 0.0 };
-                (whole.x.clone()).map(|x| share(table.mass(&(x..x + 1), &(y..y + 1)))).collect()
-            }
+                    of_tiles[tile as usize] * table.sample_probability(tile, x, y)
+                };
+                // Exact sums: each patch is sampled with its reported probability.
+                let reported: Vec<f64> = whole.x.clone().map(of_patch).collect();
+                [reported.clone(), reported]
+            })
+        }
+        Table::SummedArea(table) => {
+            let (of_rows, total) = (table.row_distribution(&whole), table.mass(&whole.x, &whole.y));
+            Box::new(move |y| {
+                let columns = table.column_distribution(&whole, y);
+                let sampled = columns.iter().map(|column| column * of_rows[y as usize]);
+                let mass = |x| table.mass(&(x..x + 1), &(y..y + 1));
+                [sampled.collect(), whole.x.clone().map(|x| share(mass(x), total)).collect()]
+            })
         }
     }
 }
