@@ -120,8 +120,7 @@ fn tap(b: &mut Builder, metal: Mat, height: f32, reach: f32) {
         let (s, c) = (PI * k as f32 / 12.0).sin_cos();
         (Vec3::new(0.0, height + 0.5 * reach * s, 0.5 * reach * (1.0 - c)), 0.011)
     });
-    let path: Vec<_> = std::iter::once((Vec3::ZERO, 0.011)).chain(bend).collect();
-    b.tube(metal, 16, &path);
+    b.tube(metal, 16, std::iter::once((Vec3::ZERO, 0.011)).chain(bend));
     b.drum(metal, [0.0, 0.014], [0.030, 0.028], 0.003);
     b.rod(metal, Vec3::Y * (height - 0.05), Vec3::new(0.07, height - 0.03, 0.0), 0.006);
 }
@@ -148,7 +147,7 @@ fn bath(b: &mut Builder, m: &Palette) {
         b.part(Affine3A::from_scale(Vec3::new(0.37, 1.0, 0.82)), |b| {
             let outside = [(0.72, 0.0), (0.76, 0.004), (0.79, 0.05), (0.88, 0.30), (1.0, 0.57)];
             let inside = [(0.95, 0.57), (0.84, 0.30), (0.68, 0.13), (0.5, 0.11), (0.0, 0.105)];
-            b.lathe(m.ceramic, 96, &tableware::smooth(&[outside, inside].concat(), 8));
+            b.lathe(m.ceramic, 96, tableware::smooth(&[outside, inside].concat(), 8));
         });
         b.slab(m.oak, [-0.42, 0.604, 0.10], [0.42, 0.622, 0.28], 0.004);
     });

@@ -105,8 +105,7 @@ fn crate_box(b: &mut Builder, wood: Mat, iron: Mat, [w, h, d]: [f32; 3]) {
 /// A barrel of `height` with staves and hoops.
 fn barrel(b: &mut Builder, wood: Mat, iron: Mat, height: f32) {
     let radius = |t: f32| height * (0.27 + 0.075 * (std::f32::consts::PI * t).sin());
-    let staves: Vec<(f32, f32)> =
-        (0..=16).map(|k| k as f32 / 16.0).map(|t| (radius(t), t * height)).collect();
+    let staves = (0..=16).map(|k| k as f32 / 16.0).map(|t| (radius(t), t * height));
     let mut profile = vec![(0.0, 0.01), (radius(0.0) - 0.02, 0.01), (radius(0.0) - 0.018, 0.0)];
     profile.extend(staves);
     profile.extend([
@@ -114,7 +113,7 @@ fn barrel(b: &mut Builder, wood: Mat, iron: Mat, height: f32) {
         (radius(1.0) - 0.022, height - 0.03),
         (0.0, height - 0.03),
     ]);
-    b.lathe(wood, 48, &profile);
+    b.lathe(wood, 48, profile);
     for t in [0.04, 0.22, 0.78, 0.96] {
         let (y, r) = (t * height, radius(t));
         let slope = (radius(t + 0.01) - r) * 100.0 / height * 0.02;
@@ -124,6 +123,6 @@ fn barrel(b: &mut Builder, wood: Mat, iron: Mat, height: f32) {
             (r + slope + 0.004, y + 0.02),
             (r + slope, y + 0.02),
         ];
-        b.lathe(iron, 48, &profile);
+        b.lathe(iron, 48, profile);
     }
 }

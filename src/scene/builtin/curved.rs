@@ -44,8 +44,13 @@ impl Builder {
 
     /// Surface of revolution about +Y of a `profile` of (radius, height), whose front is on the
     /// right of the way along it (upwards: outside). Corners sharper than 40 degrees stay creases.
-    pub(super) fn lathe(&mut self, mat: Mat, segments: u32, profile: &[(f32, f32)]) {
-        let points: Vec<Vec2> = profile.iter().map(|&(r, y)| Vec2::new(r, y)).collect();
+    pub(super) fn lathe(
+        &mut self,
+        mat: Mat,
+        segments: u32,
+        profile: impl IntoIterator<Item = (f32, f32)>,
+    ) {
+        let points: Vec<Vec2> = profile.into_iter().map(Vec2::from).collect();
         let normal = |i: usize| {
             let d = points[i + 1] - points[i];
             Vec2::new(d.y, -d.x).normalize_or_zero()
@@ -92,11 +97,17 @@ impl Builder {
             (r1 - bevel, y1),
             (0.0, y1),
         ];
-        self.lathe(mat, segments, &profile);
+        self.lathe(mat, segments, profile);
     }
 
     /// A round tube along `path` of (centre, radius), closed by flat ends.
-    pub(super) fn tube(&mut self, mat: Mat, segments: u32, path: &[(Vec3, f32)]) {
+    pub(super) fn tube(
+        &mut self,
+        mat: Mat,
+        segments: u32,
+        path: impl IntoIterator<Item = (Vec3, f32)>,
+    ) {
+        let path: Vec<_> = path.into_iter().collect();
         let tangent = |i: usize| {
             let (before, after) =
                 (path[i.saturating_sub(1)].0, path[(i + 1).min(path.len() - 1)].0);
@@ -140,7 +151,7 @@ impl Builder {
     /// A straight rod.
     pub(super) fn rod(&mut self, mat: Mat, from: Vec3, to: Vec3, radius: f32) {
         let segments = if radius > 0.012 { 20 } else { 10 };
-        self.tube(mat, segments, &[(from, radius), (to, radius)]);
+        self.tube(mat, segments, [(from, radius), (to, radius)]);
     }
 
     /// The body `(|x|^k + |z|^k)^(j/k) + |y|^j = 1`, scaled to `half` extents about `centre`, of

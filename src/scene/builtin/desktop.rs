@@ -69,14 +69,14 @@ pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
         (0.034, 0.006),
         (0.0, 0.005),
     ];
-    b.lathe(cup, 32, &profile);
+    b.lathe(cup, 32, profile);
     let mut stream = Stream::new(3);
     for k in 0..7 {
         let (s, c) = (k as f32 * 0.9).sin_cos();
         let foot = Vec3::new(-0.018 * c, 0.008, -0.018 * s);
         let tip = Vec3::new(0.034 * c, stream.between(0.15, 0.19), 0.034 * s);
         b.tinted(COVERS[stream.index(COVERS.len())], |b| {
-            b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)]);
+            b.tube(wood, 6, [(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)]);
         });
     }
 }

@@ -155,21 +155,15 @@ fn sill(b: &mut Builder, mat: Mat, [u0, v0, u1, _]: [f32; 4]) {
 }
 
 /// A round arch in a wall's frame between columns at `u0` and `u1`: the wall above it from
-/// `spring` to `top`, `depth` deep behind z = 0.
-pub(super) fn arch(
-    b: &mut Builder,
-    mat: Mat,
-    [u0, u1]: [f32; 2],
-    [spring, top]: [f32; 2],
-    depth: f32,
-) {
+/// `spring` to `top`, 40 cm deep behind z = 0.
+pub(super) fn arch(b: &mut Builder, mat: Mat, [u0, u1]: [f32; 2], [spring, top]: [f32; 2]) {
     const STEPS: u32 = 24;
     let (middle, r) = (0.5 * (u0 + u1), 0.5 * (u1 - u0));
     let at = |k: u32| {
         let (s, c) = (PI * k as f32 / STEPS as f32).sin_cos();
         (Vec3::new(-c, s, 0.0), Vec3::new(middle - r * c, spring + r * s, 0.0))
     };
-    let back = Vec3::NEG_Z * depth;
+    let back = Vec3::NEG_Z * 0.4;
     for k in 0..STEPS {
         let ((n0, p0), (n1, p1)) = (at(k), at(k + 1));
         let high = |p: Vec3| Vec3::new(p.x, top, 0.0);
@@ -209,5 +203,5 @@ pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
         let (s, c) = (k as f32 / 6.0 * 0.5 * PI).sin_cos();
         profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));
     }
-    b.lathe(mat, 28, &profile);
+    b.lathe(mat, 28, profile);
 }

@@ -127,7 +127,7 @@ pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, heigh
         (grip, 0.0085),
         (grip - Vec3::X * 0.003, 0.004),
     ];
-    b.tube(metal, 14, &path);
+    b.tube(metal, 14, path);
 }
 
 /// A curtain that hangs from `top` to `bottom` between `u` in a wall's frame, `offset` before the wall,

@@ -18,7 +18,7 @@ pub(super) fn table(b: &mut Builder, top: Mat, legs: Mat, [width, depth, height]
     for (sx, sz) in [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)] {
         let head = Vec3::new(sx * (x - 0.09), height - 0.02, sz * (z - 0.09));
         let foot = Vec3::new(sx * (x - 0.05), 0.0, sz * (z - 0.05));
-        b.tube(legs, 20, &[(foot, 0.013), (head.lerp(foot, 0.3), 0.024), (head, 0.026)]);
+        b.tube(legs, 20, [(foot, 0.013), (head.lerp(foot, 0.3), 0.024), (head, 0.026)]);
     }
 }
 
@@ -31,7 +31,7 @@ pub(super) fn round_table(b: &mut Builder, top: Mat, legs: Mat, radius: f32, hei
         profile.push((radius - 0.018 + 0.018 * c, height - 0.5 * t + 0.5 * t * s));
     }
     profile.push((0.0, height));
-    b.lathe(top, 96, &profile);
+    b.lathe(top, 96, profile);
     for k in 0..3 {
         let (s, c) = (k as f32 * TAU / 3.0 + 0.4).sin_cos();
         let out = Vec3::new(c, 0.0, s);
@@ -41,7 +41,7 @@ pub(super) fn round_table(b: &mut Builder, top: Mat, legs: Mat, radius: f32, hei
             (out * radius * 0.62 + Vec3::Y * height * 0.75, 0.021),
             (head, 0.022),
         ];
-        b.tube(legs, 20, &path);
+        b.tube(legs, 20, path);
     }
 }
 
@@ -113,7 +113,7 @@ pub(super) fn drawers(
             let into = Vec3::Z * 0.03;
             let bend = Vec3::X * 0.009;
             let path = [l - into, l - into * 0.3, l + bend, r - bend, r - into * 0.3, r - into];
-            b.tube(metal, 10, &path.map(|p| (p, 0.004)));
+            b.tube(metal, 10, path.map(|p| (p, 0.004)));
         }
     }
 }
@@ -125,7 +125,7 @@ pub(super) fn radiator(b: &mut Builder, enamel: Mat, width: f32, height: f32) {
         let x = (i as f32 + 0.5) * 0.055 - 0.5 * width;
         for z in [0.035, 0.095] {
             let path = [(Vec3::new(x, 0.10, z), 0.0135), (Vec3::new(x, height - 0.01, z), 0.0135)];
-            b.tube(enamel, 12, &path);
+            b.tube(enamel, 12, path);
         }
         for y in [0.11, height - 0.02] {
             b.blob(enamel, Vec3::new(x, y, 0.065), Vec3::new(0.0275, 0.024, 0.055), [3.0, 2.5], 6);
@@ -159,7 +159,7 @@ pub(super) fn rug(b: &mut Builder, pattern: Mat, fringe: Mat, [width, depth]: [f
             let to = from + Vec3::new(length, -0.0035, stream.between(-0.012, 0.012));
             let path =
                 [(from, 0.003), (from.lerp(to, 0.5) + Vec3::Y * 0.001, 0.0026), (to, 0.0012)];
-            b.tube(fringe, 5, &path);
+            b.tube(fringe, 5, path);
         }
     }
 }

@@ -8,14 +8,8 @@ use glam::Vec3;
 use super::mesh::{Builder, Mat, placed};
 
 /// A floor lamp: a curved arm over a heavy foot, and a linen drum shade.
-pub(super) fn arc_lamp(
-    b: &mut Builder,
-    metal: Mat,
-    [shade, bulb]: [Mat; 2],
-    stone: Mat,
-    height: f32,
-    reach: f32,
-) {
+pub(super) fn arc_lamp(b: &mut Builder, metal: Mat, [shade, bulb]: [Mat; 2], stone: Mat) {
+    let (height, reach) = (2.05, 0.85);
     b.drum(stone, [0.0, 0.05], [0.17, 0.17], 0.012);
     let mut path = vec![(Vec3::Y * 0.04, 0.011), (Vec3::Y * height * 0.55, 0.011)];
     for i in 1..=24 {
@@ -28,7 +22,7 @@ pub(super) fn arc_lamp(
     }
     let tip = path[path.len() - 1].0;
     path.push((tip - Vec3::Y * 0.08, 0.008));
-    b.tube(metal, 14, &path);
+    b.tube(metal, 14, path);
     b.moved(tip - Vec3::Y * 0.09, |b| {
         b.drum(metal, [-0.05, 0.03], [0.022, 0.014], 0.003);
         drum_shade(b, shade, 0.21, 0.17, 0.25);
@@ -46,7 +40,7 @@ pub(super) fn drum_shade(b: &mut Builder, cloth: Mat, bottom: f32, top: f32, hei
         (top - wall, 0.0),
         (bottom - wall, -height),
     ];
-    b.lathe(cloth, 64, &profile);
+    b.lathe(cloth, 64, profile);
     for k in 0..3 {
         let (s, c) = (k as f32 * TAU / 3.0).sin_cos();
         b.rod(cloth, Vec3::Y * -0.02, Vec3::new(top * s * 0.99, -0.012, top * c * 0.99), 0.002);
@@ -63,18 +57,16 @@ pub(super) fn pendant(
 ) {
     b.drum(metal, [-0.03, 0.01], [0.05, 0.055], 0.004);
     b.rod(inside, Vec3::Y * -0.02, Vec3::Y * (0.10 - drop), 0.003);
-    let mut outer = Vec::new();
-    for i in 0..=16 {
+    let outer = (0..=16).map(|i| {
         let (s, c) = (i as f32 / 16.0 * FRAC_PI_2).sin_cos();
-        outer.push((radius * c.max(0.07), radius * 0.75 * s - drop));
-    }
-    b.lathe(metal, 64, &outer);
+        (radius * c.max(0.07), radius * 0.75 * s - drop)
+    });
+    b.lathe(metal, 64, outer.clone());
     let top = radius * 0.75 - drop;
     b.drum(metal, [top - 0.01, top + 0.05], [radius * 0.1, 0.012], 0.003);
-    let inner: Vec<(f32, f32)> =
-        outer.iter().rev().map(|&(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius))).collect();
-    b.lathe(inside, 64, &inner);
-    b.lathe(metal, 64, &[(radius - 0.002, -drop), (radius, -drop)]);
+    let inner = outer.rev().map(|(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius)));
+    b.lathe(inside, 64, inner);
+    b.lathe(metal, 64, [(radius - 0.002, -drop), (radius, -drop)]);
     b.ball(bulb, Vec3::Y * (0.25 * radius - drop), 0.05);
 }
 
@@ -92,10 +84,9 @@ pub(super) fn globe_lamp(b: &mut Builder, metal: Mat, [glass, bulb]: [Mat; 2], r
             let (s, c) = (neck + (PI - neck) * k as f32 / 32.0).sin_cos();
             (r * s.max(0.0), middle - r * c)
         };
-        let mut profile: Vec<_> = (0..=32).map(|k| at(radius, k)).collect();
-        profile.extend((0..=32).rev().map(|k| at(radius - 0.004, k)));
-        profile.push(at(radius, 0));
-        b.lathe(glass, 64, &profile);
+        let outside = (0..=32).map(|k| at(radius, k));
+        let inside = (0..=32).rev().map(|k| at(radius - 0.004, k));
+        b.lathe(glass, 64, outside.chain(inside).chain([at(radius, 0)]));
     });
 }
 
@@ -114,13 +105,10 @@ pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
     b.part(placed([0.0, 0.50, 0.125], [-28.0, 0.0, 0.0]), |b| {
         let outer =
             [(0.018, 0.045), (0.026, 0.02), (0.035, -0.005), (0.062, -0.05), (0.078, -0.10)];
-        let mut profile: Vec<(f32, f32)> = outer.iter().rev().copied().collect();
-        profile.push((0.0, 0.05));
-        b.lathe(metal, 40, &profile);
-        let mut lining: Vec<(f32, f32)> = outer[1..].iter().map(|&(r, y)| (r - 0.002, y)).collect();
-        lining.insert(0, (0.0, 0.018));
-        b.lathe(inside, 40, &lining);
-        b.lathe(metal, 40, &[(0.076, -0.10), (0.078, -0.10)]);
+        b.lathe(metal, 40, outer.into_iter().rev().chain([(0.0, 0.05)]));
+        let lining = outer.into_iter().skip(1).map(|(r, y)| (r - 0.002, y));
+        b.lathe(inside, 40, [(0.0, 0.018)].into_iter().chain(lining));
+        b.lathe(metal, 40, [(0.076, -0.10), (0.078, -0.10)]);
         b.ball(inside, Vec3::new(0.0, -0.035, 0.0), 0.025);
     });
 }
@@ -144,9 +132,9 @@ pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
         (0.09, h - 0.58),
         (0.11, h - 0.55),
     ];
-    b.lathe(metal, 24, &profile);
+    b.lathe(metal, 24, profile);
     b.moved(Vec3::Y * (h - 0.56), |b| {
-        b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
+        b.lathe(pane, 6, [(0.10, 0.0), (0.19, 0.40)]);
         for k in 0..6 {
             let (s, c) = (k as f32 * PI / 3.0).sin_cos();
             let at = |radius: f32, y: f32| Vec3::new(radius * c, y, radius * s);
@@ -162,6 +150,6 @@ pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
             (0.022, 0.60),
             (0.0, 0.66),
         ];
-        b.lathe(metal, 24, &profile);
+        b.lathe(metal, 24, profile);
     });
 }

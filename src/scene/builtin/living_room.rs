@@ -117,7 +117,7 @@ fn shell(b: &mut Builder, m: &Palette) {
                 (r - 0.02, 0.014),
                 (r - 0.02, -0.10),
             ];
-            b.lathe(m.oak, 64, &profile);
+            b.lathe(m.oak, 64, profile);
         });
     });
 }
@@ -216,7 +216,7 @@ fn library(b: &mut Builder, m: &Palette) {
 
 fn corners(b: &mut Builder, m: &Palette) {
     b.standing([-2.45, 0.0, -2.1], -20.0, |b| {
-        lamps::arc_lamp(b, m.brass, [m.shade, m.bulbs[0]], m.stone, 2.05, 0.85);
+        lamps::arc_lamp(b, m.brass, [m.shade, m.bulbs[0]], m.stone);
     });
     b.standing([1.25, 0.0, -2.08], 0.0, |b| {
         let soil = plants::pot(b, m.clay, m.soil, 0.20, 0.36);

@@ -99,15 +99,13 @@ pub(super) fn mug(b: &mut Builder, glaze: Mat, drink: Mat) {
         (0.030, 0.006),
         (0.0, 0.006),
     ];
-    b.lathe(glaze, 40, &profile);
-    b.lathe(drink, 40, &[(0.0378, 0.078), (0.0, 0.078)]);
-    let path: Vec<(Vec3, f32)> = (0..=12)
-        .map(|i| {
-            let (s, c) = (i as f32 / 12.0 * PI - FRAC_PI_2).sin_cos();
-            (Vec3::new(0.038 + 0.028 * c, 0.048 + 0.026 * s, 0.0), 0.0048)
-        })
-        .collect();
-    b.tube(glaze, 10, &path);
+    b.lathe(glaze, 40, profile);
+    b.lathe(drink, 40, [(0.0378, 0.078), (0.0, 0.078)]);
+    let path = (0..=12).map(|i| {
+        let (s, c) = (i as f32 / 12.0 * PI - FRAC_PI_2).sin_cos();
+        (Vec3::new(0.038 + 0.028 * c, 0.048 + 0.026 * s, 0.0), 0.0048)
+    });
+    b.tube(glaze, 10, path);
 }
 
 /// A vase thrown from a profile of radii (fractions of `height`) at even heights, with a thin wall.
@@ -127,7 +125,7 @@ pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
     let inside = (3..=STEPS).rev().map(share);
     profile.extend(inside.map(|t| ((radius(t) - wall) * height, t * height)));
     profile.push((0.0, 0.06 * height));
-    b.lathe(mat, 48, &profile);
+    b.lathe(mat, 48, profile);
 }
 
 /// A shallow bowl.
@@ -142,7 +140,7 @@ pub(super) fn bowl(b: &mut Builder, mat: Mat, radius: f32, height: f32) {
     profile
         .extend((1..=20).rev().map(|i| curve(i as f32 / 20.0, 0.005)).map(|(r, y)| (r, y + 0.001)));
     profile.push((0.0, 0.011));
-    b.lathe(mat, 56, &profile);
+    b.lathe(mat, 56, profile);
 }
 
 /// A heap of round fruit in a bowl of `radius`.
@@ -195,8 +193,8 @@ pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f3
             (radius - 0.02, 0.034),
             (radius - 0.02, 0.02),
         ];
-        b.lathe(rim, 64, &profile);
-        b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
+        b.lathe(rim, 64, profile);
+        b.lathe(face, 64, [(radius - 0.018, 0.024), (0.0, 0.024)]);
     });
     for hour in 0..12 {
         b.part(Affine3A::from_rotation_z(hour as f32 * TAU / 12.0), |b| {
@@ -223,5 +221,5 @@ pub(super) fn basket(b: &mut Builder, mat: Mat) {
         (0.112, 0.01),
         (0.0, 0.009),
     ];
-    b.lathe(mat, 40, &profile);
+    b.lathe(mat, 40, profile);
 }

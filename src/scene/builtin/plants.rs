@@ -58,8 +58,8 @@ pub(super) fn pot(b: &mut Builder, clay: Mat, soil: Mat, radius: f32, height: f3
         (0.90 * r, 0.97 * h),
         (0.86 * r, 0.80 * h),
     ];
-    b.lathe(clay, 48, &profile);
-    b.lathe(soil, 40, &[(0.90 * r, 0.88 * h), (0.5 * r, 0.91 * h), (0.0, 0.90 * h)]);
+    b.lathe(clay, 48, profile);
+    b.lathe(soil, 40, [(0.90 * r, 0.88 * h), (0.5 * r, 0.91 * h), (0.0, 0.90 * h)]);
     0.9 * h
 }
 
@@ -89,13 +89,11 @@ pub(super) fn big_leaves(b: &mut Builder, mat: Mat, count: u32, height: f32, see
         let tip = out * reach + Vec3::Y * top;
         let knee = out * (0.25 * reach) + Vec3::Y * (0.6 * top);
         b.tinted(GREENS[stream.index(GREENS.len())], |b| {
-            let path: Vec<(Vec3, f32)> = (0..=8)
-                .map(|k| {
-                    let f = k as f32 / 8.0;
-                    ((knee * (2.0 * f * (1.0 - f))) + tip * (f * f), 0.0075 - 0.004 * f)
-                })
-                .collect();
-            b.tube(mat, 7, &path);
+            let path = (0..=8).map(|k| {
+                let f = k as f32 / 8.0;
+                ((knee * (2.0 * f * (1.0 - f))) + tip * (f * f), 0.0075 - 0.004 * f)
+            });
+            b.tube(mat, 7, path);
             let size = height * stream.between(0.26, 0.36);
             let rise = stream.between(-0.1, 0.5);
             b.part(growing(tip, out + Vec3::Y * rise), |b| {
@@ -117,9 +115,9 @@ pub(super) fn trailing(b: &mut Builder, mat: Mat, radius: f32, length: f32, seed
                 + Vec3::Y
                     * (0.05 * (1.0 - (2.0 * f - 0.3).powi(2)) - drop * (f - 0.2).max(0.0) / 0.8)
         };
-        let path: Vec<(Vec3, f32)> = (0..=10).map(|k| (at(k as f32 / 10.0), 0.0016)).collect();
+        let path = (0..=10).map(|k| (at(k as f32 / 10.0), 0.0016));
         b.tinted(GREENS[i % GREENS.len()], |b| {
-            b.tube(mat, 5, &path);
+            b.tube(mat, 5, path);
             let leaves = (drop / 0.035) as u32 + 4;
             for k in 0..leaves {
                 let f = (k as f32 + 0.5) / leaves as f32;
@@ -140,9 +138,8 @@ pub(super) fn twigs(b: &mut Builder, bark: Mat, mat: Mat, height: f32, seed: u32
         let h = height * stream.between(0.75, 1.0);
         let lean = stream.between(0.15, 0.45);
         let at = |f: f32| out * (0.01 + lean * h * f * f) + Vec3::Y * (0.02 + h * f);
-        let path: Vec<(Vec3, f32)> =
-            (0..=8).map(|k| (at(k as f32 / 8.0), 0.003 - 0.0002 * k as f32)).collect();
-        b.tube(bark, 6, &path);
+        let path = (0..=8).map(|k| (at(k as f32 / 8.0), 0.003 - 0.0002 * k as f32));
+        b.tube(bark, 6, path);
         for k in 0..14 {
             let f = 0.42 + 0.58 * (k as f32 + 0.5) / 14.0;
             let (s, c) = (k as f32 * 2.4).sin_cos();
@@ -195,7 +192,7 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
         (kink, 0.95 * thick),
         (fork, 0.8 * thick),
     ];
-    b.tube(bark, 16, &path);
+    b.tube(bark, 16, path);
     let limbs = 7;
     let leaf_length = 0.035 * height.sqrt() + 0.06;
     for i in 0..limbs {
@@ -206,7 +203,7 @@ pub(super) fn tree(b: &mut Builder, bark: Mat, mat: Mat, height: f32, leaves: u3
         let elbow = fork.lerp(tip, 0.5) + Vec3::new(c, -0.4, s) * 0.04 * height;
         let path =
             [(fork - Vec3::Y * 0.08, 0.55 * thick), (elbow, 0.4 * thick), (tip, 0.15 * thick)];
-        b.tube(bark, 8, &path);
+        b.tube(bark, 8, path);
         let size = height * stream.between(0.13, 0.19);
         let half = Vec3::new(size, 0.8 * size, size);
         let centre = tip + Vec3::Y * 0.05 * height;

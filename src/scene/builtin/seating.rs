@@ -13,7 +13,7 @@ pub(super) fn sofa(b: &mut Builder, cloth: Mat, wood: Mat, width: f32, seats: u3
     let arm = 0.17;
     for (sx, z) in [(-1., 0.08), (1., 0.08), (-1., depth - 0.1), (1., depth - 0.1)] {
         let foot = Vec3::new(sx * (x - 0.1), 0.0, z - 0.5 * depth);
-        b.tube(wood, 16, &[(foot, 0.014), (foot + Vec3::Y * 0.16, 0.024)]);
+        b.tube(wood, 16, [(foot, 0.014), (foot + Vec3::Y * 0.16, 0.024)]);
     }
     let z = 0.5 * depth;
     b.slab(cloth, [-x + 0.02, 0.13, -z + 0.02], [x - 0.02, 0.30, z - 0.03], 0.025);
@@ -47,7 +47,7 @@ pub(super) fn armchair(b: &mut Builder, cloth: Mat, wood: Mat) {
     for (sx, sz) in [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)] {
         let foot = Vec3::new(sx * 0.33, 0.0, sz * 0.30);
         let head = Vec3::new(sx * 0.26, 0.24, sz * 0.24);
-        b.tube(wood, 16, &[(foot, 0.011), (head, 0.021)]);
+        b.tube(wood, 16, [(foot, 0.011), (head, 0.021)]);
     }
     b.blob(cloth, Vec3::new(0.0, 0.27, 0.0), Vec3::new(0.35, 0.075, 0.34), [5.0, 4.0], 16);
     b.blob(cloth, Vec3::new(0.0, 0.385, 0.03), Vec3::new(0.27, 0.075, 0.31), [5.0, 3.0], 16);
@@ -83,14 +83,14 @@ pub(super) fn armchair(b: &mut Builder, cloth: Mat, wood: Mat) {
 pub(super) fn side_chair(b: &mut Builder, wood: Mat, seat: Mat) {
     for sx in [-1.0, 1.0] {
         let (front, back) = (Vec3::new(sx * 0.19, 0.0, 0.19), Vec3::new(sx * 0.18, 0.0, -0.21));
-        b.tube(wood, 14, &[(front, 0.012), (Vec3::new(sx * 0.18, 0.44, 0.17), 0.018)]);
+        b.tube(wood, 14, [(front, 0.012), (Vec3::new(sx * 0.18, 0.44, 0.17), 0.018)]);
         let path = [
             (back, 0.012),
             (Vec3::new(sx * 0.175, 0.44, -0.17), 0.018),
             (Vec3::new(sx * 0.17, 0.66, -0.185), 0.016),
             (Vec3::new(sx * 0.165, 0.84, -0.225), 0.012),
         ];
-        b.tube(wood, 14, &path);
+        b.tube(wood, 14, path);
         b.rod(wood, Vec3::new(sx * 0.186, 0.22, 0.18), Vec3::new(sx * 0.178, 0.22, -0.19), 0.009);
     }
     b.slab(wood, [-0.20, 0.40, -0.19], [0.20, 0.435, 0.20], 0.008);
@@ -113,11 +113,11 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
             (out * 0.17 + Vec3::Y * 0.10, 0.022),
             (out * 0.30 + Vec3::Y * 0.075, 0.015),
         ];
-        b.tube(plastic, 12, &path);
+        b.tube(plastic, 12, path);
         for side in [-0.014, 0.014] {
             let hub = out * 0.30 + out.cross(Vec3::Y) * side + Vec3::Y * 0.027;
             let axle = out.cross(Vec3::Y) * 0.009;
-            b.tube(plastic, 18, &[(hub - axle, 0.027), (hub + axle, 0.027)]);
+            b.tube(plastic, 18, [(hub - axle, 0.027), (hub + axle, 0.027)]);
         }
     }
     b.drum(metal, [0.09, 0.44], [0.024, 0.024], 0.002);
@@ -130,7 +130,7 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
         (Vec3::new(0.0, 0.52, -0.305), 0.020),
         (Vec3::new(0.0, 0.78, -0.285), 0.018),
     ];
-    b.tube(plastic, 12, &path);
+    b.tube(plastic, 12, path);
     let shape = |u: f32, v: f32, side: f32| {
         let (x, y) = ((u - 0.5) * 2.0, (v - 0.5) * 2.0);
         let half = 0.225 - 0.03 * y * y;
@@ -151,7 +151,7 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
             (Vec3::new(sx * 0.29, 0.50, -0.02), 0.014),
             (Vec3::new(sx * 0.285, 0.66, -0.03), 0.014),
         ];
-        b.tube(plastic, 12, &path);
+        b.tube(plastic, 12, path);
         let (middle, half) = (Vec3::new(sx * 0.285, 0.675, 0.0), Vec3::new(0.04, 0.016, 0.13));
         b.blob(plastic, middle, half, [4.0, 3.0], 8);
     }

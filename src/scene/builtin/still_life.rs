@@ -51,7 +51,7 @@ fn room(b: &mut Builder) {
     let silver = b.material(metal("silvered glass", [0.93, 0.93, 0.91], 0.0));
     b.part(placed([-0.20, 1.22, -0.30], [90.0, 0.0, 0.0]), |b| {
         let r = 0.235;
-        b.lathe(silver, 96, &[(r, 0.012), (0.0, 0.012)]);
+        b.lathe(silver, 96, [(r, 0.012), (0.0, 0.012)]);
         let profile = [
             (r + 0.012, -0.004),
             (r + 0.012, 0.020),
@@ -60,7 +60,7 @@ fn room(b: &mut Builder) {
             (r - 0.003, 0.020),
             (r - 0.003, 0.008),
         ];
-        b.lathe(brass, 96, &profile);
+        b.lathe(brass, 96, profile);
     });
 }
 
@@ -83,7 +83,7 @@ fn tea(b: &mut Builder) {
     for (x, z) in [(-0.06, 0.08), (-0.04, 0.195)] {
         b.scaled([x, on_cloth, z], 0.0, 1.2, |b| {
             objects::bowl(b, glaze, 0.045, 0.048);
-            b.lathe(tea, 40, &[(0.0425, 0.036), (0.0, 0.036)]);
+            b.lathe(tea, 40, [(0.0425, 0.036), (0.0, 0.036)]);
         });
     }
 }
@@ -145,7 +145,7 @@ fn glasses(b: &mut Builder) {
             (0.016, 0.33),
             (0.021, 0.345),
         ];
-        b.lathe(frosted, 64, &tableware::smooth(&shape, 6));
+        b.lathe(frosted, 64, tableware::smooth(&shape, 6));
     });
     b.scaled([-0.67, 0.0, 0.10], 0.0, 1.2, |b| {
         let shape = [
@@ -157,7 +157,7 @@ fn glasses(b: &mut Builder) {
             (0.034, 0.125),
             (0.044, 0.145),
         ];
-        b.lathe(bubble, 64, &tableware::smooth(&shape, 8));
+        b.lathe(bubble, 64, tableware::smooth(&shape, 8));
     });
     let radius = 0.08;
     b.part(placed([0.13, 0.609 * radius + 4e-4, 0.13], [0.0, 65.0, -35.75]), |b| {

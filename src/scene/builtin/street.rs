@@ -133,7 +133,7 @@ fn arcade(b: &mut Builder, m: &Palette) {
     b.part(wall.frame(), |b| {
         for k in 0..6 {
             let u = bay * k as f32;
-            facade::arch(b, stone, [u + 0.44, u + bay], [spring - 0.002, top], 0.4);
+            facade::arch(b, stone, [u + 0.44, u + bay], [spring - 0.002, top]);
             b.slab(stone, [u, spring - 0.004, -0.4], [u + 0.44, top, 0.0], 0.0);
         }
         let end = 6.0 * bay;

@@ -42,27 +42,21 @@ pub(super) fn teapot(b: &mut Builder, glaze: Mat, knob: Mat) {
     ));
     body.push((0.0485, 0.1195));
     body.extend(smooth(&[(0.0480, 0.1205), (0.044, 0.127), (0.026, 0.135), (0.0, 0.137)], 5));
-    b.lathe(glaze, 72, &body);
-    b.lathe(
-        knob,
-        32,
-        &smooth(&[(0.007, 0.135), (0.006, 0.142), (0.014, 0.150), (0.010, 0.159), (0.0, 0.161)], 4),
-    );
+    b.lathe(glaze, 72, body);
+    let top = [(0.007, 0.135), (0.006, 0.142), (0.014, 0.150), (0.010, 0.159), (0.0, 0.161)];
+    b.lathe(knob, 32, smooth(&top, 4));
     let spline = smooth(&[(0.075, 0.048), (0.110, 0.066), (0.130, 0.098), (0.152, 0.122)], 6);
     let last = spline.len() as f32 - 1.0;
-    let spout: Vec<(Vec3, f32)> = spline
-        .iter()
+    let spout = spline
+        .into_iter()
         .enumerate()
-        .map(|(k, &(x, y))| (Vec3::new(x, y, 0.0), 0.024 - 0.0145 * (k as f32 / last).powf(0.7)))
-        .collect();
-    b.tube(glaze, 24, &spout);
-    let handle: Vec<(Vec3, f32)> = (0..=24)
-        .map(|k| {
-            let (s, c) = (PI * (k as f32 / 24.0 * 1.08 - 0.58)).sin_cos();
-            (Vec3::new(-0.083 - 0.055 * c, 0.068 + 0.042 * s, 0.0), 0.0072)
-        })
-        .collect();
-    b.tube(glaze, 16, &handle);
+        .map(|(k, (x, y))| (Vec3::new(x, y, 0.0), 0.024 - 0.0145 * (k as f32 / last).powf(0.7)));
+    b.tube(glaze, 24, spout);
+    let handle = (0..=24).map(|k| {
+        let (s, c) = (PI * (k as f32 / 24.0 * 1.08 - 0.58)).sin_cos();
+        (Vec3::new(-0.083 - 0.055 * c, 0.068 + 0.042 * s, 0.0), 0.0072)
+    });
+    b.tube(glaze, 16, handle);
 }
 
 /// A carafe of one thin wall, `height` high, with a drink in it.
@@ -79,7 +73,7 @@ pub(super) fn carafe(b: &mut Builder, glass: Mat, drink: Mat, height: f32) {
     ];
     let wall: Vec<_> =
         smooth(&shape, 8).into_iter().map(|(r, y)| (r * height, y * height)).collect();
-    b.lathe(glass, 72, &wall);
+    b.lathe(glass, 72, wall.iter().copied());
     let full = 0.50 * height;
     let mut body: Vec<_> = wall
         .into_iter()
@@ -88,7 +82,7 @@ pub(super) fn carafe(b: &mut Builder, glass: Mat, drink: Mat, height: f32) {
         .collect();
     let (r, y) = body[body.len() - 1];
     body.extend([(r, y + 1e-4), (0.0, y + 1e-4)]);
-    b.lathe(drink, 72, &body);
+    b.lathe(drink, 72, body);
 }
 
 /// A brilliant of `radius` on its girdle, 0.609 of it above a table on which it lies tilted by 35.75 degrees.
@@ -159,29 +153,27 @@ pub(super) fn candle(b: &mut Builder, wax: Mat, wick: Mat, radius: f32, height: 
         5,
     ));
     profile.dedup();
-    b.lathe(wax, 48, &profile);
+    b.lathe(wax, 48, profile);
     let path = [
         (Vec3::Y * (h - 0.0095), 0.0012),
         (Vec3::Y * (h + 0.004), 0.0012),
         (Vec3::new(0.003, h + 0.009, 0.0), 0.001),
     ];
-    b.tube(wick, 8, &path);
+    b.tube(wick, 8, path);
 }
 
 /// A round paper lantern over hoops, its lower rim at y = 0, open above and below.
 pub(super) fn lantern(b: &mut Builder, paper: Mat, radius: f32) {
     const HOOPS: u32 = 13;
     const STEPS: u32 = 4;
-    let profile: Vec<_> = (0..=HOOPS * STEPS)
-        .map(|k| {
-            let along = k as f32 / STEPS as f32;
-            let (s, c) = (PI * (0.11 + 0.78 * along / HOOPS as f32)).sin_cos();
-            // Paper sags between two hoops.
-            let sag = 1.0 - 0.022 * (PI * along.fract()).sin();
-            (radius * s * sag, radius * 0.86 * (0.94 - c))
-        })
-        .collect();
-    b.lathe(paper, 72, &profile);
+    let profile = (0..=HOOPS * STEPS).map(|k| {
+        let along = k as f32 / STEPS as f32;
+        let (s, c) = (PI * (0.11 + 0.78 * along / HOOPS as f32)).sin_cos();
+        // Paper sags between two hoops.
+        let sag = 1.0 - 0.022 * (PI * along.fract()).sin();
+        (radius * s * sag, radius * 0.86 * (0.94 - c))
+    });
+    b.lathe(paper, 72, profile);
 }
 
 /// A cloth that lies along a board and falls over its front edge: from `back` to `front` at y = 0, then
