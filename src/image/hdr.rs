@@ -8,7 +8,7 @@ use super::{Image, check_size};
 use crate::color::REC709_FROM_XYZ;
 use crate::error::{Decoded, Notices};
 use crate::memory;
-use glam::{DVec2, Mat3, Vec3};
+use glam::{DVec2, Vec3};
 
 /// Decodes a whole `.hdr` file. Header lines `EXPOSURE` and `COLORCORR` are undone, so that pixels
 /// are radiance again; `XYZE`, and RGBE of other `PRIMARIES`, are converted to Rec.709.
@@ -26,7 +26,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<FilePicture> {
         let (bytes, Header { width, height, .. }) = (rest.len(), header);
         return Err(format!("is cut short: {bytes} bytes cannot hold {width} x {height} pixels"));
     }
-    let decoder = PixelDecoder::new(&header, &mut notices);
+    let decoded = pixel_decoder(&header, &mut notices);
     let mut line = vec![[0u8; 4]; minor.count as usize];
     let mut pixels: Vec<[f32; 3]> = Vec::new();
     // All at once if the file can hold it in runs, else as it is read: old runs have no bound, and a
@@ -41,7 +41,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<FilePicture> {
     for row in 0..major.count {
         read_line(&mut rest, &mut line, may_have_runs)
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
-        pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
+        pixels.extend(line.iter().copied().map(&decoded));
     }
     Ok(FilePicture { image: header.upright(pixels), notices, is_linear: true, is_cube_map: false })
 }
@@ -185,33 +185,24 @@ fn parse_resolution(line: &str) -> Decoded<(Axis, Axis)> {
     })
 }
 
-/// Four bytes to linear RGB.
-struct PixelDecoder {
-    /// What a mantissa of each channel counts for, by exponent: `2^(e - 136)` without the exposure;
-    /// 0 for exponent 0, which means black.
-    scale: Vec<[f32; 3]>,
-    to_rec709: Option<Mat3>,
-}
-
-impl PixelDecoder {
-    fn new(header: &Header, notices: &mut Notices) -> Self {
-        let of = |e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32);
-        let mut scale: Vec<[f32; 3]> = (0..256).map(of).collect();
-        scale[0] = [0.0; 3];
-        let primaries = header.primaries.filter(|primaries| !primaries.is(RADIANCE));
-        let to_rec709 = match primaries {
-            _ if header.is_xyz => Some(REC709_FROM_XYZ),
-            Some(primaries) => rec709_conversion(primaries, None, notices),
-            None => None,
-        };
-        Self { scale, to_rec709 }
-    }
-
-    /// The mantissas are taken as they are, as all but Radiance itself do (it adds one half).
-    fn decode(&self, [r, g, b, e]: [u8; 4]) -> [f32; 3] {
-        let scale = self.scale[e as usize];
+/// What makes linear RGB of four bytes.
+fn pixel_decoder(header: &Header, notices: &mut Notices) -> impl Fn([u8; 4]) -> [f32; 3] + use<> {
+    // What a mantissa of each channel counts for, by exponent: `2^(e - 136)` without the exposure;
+    // 0 for exponent 0, which means black.
+    let of = |e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32);
+    let mut scales: Vec<[f32; 3]> = (0..256).map(of).collect();
+    scales[0] = [0.0; 3];
+    let primaries = header.primaries.filter(|primaries| !primaries.is(RADIANCE));
+    let to_rec709 = match primaries {
+        _ if header.is_xyz => Some(REC709_FROM_XYZ),
+        Some(primaries) => rec709_conversion(primaries, None, notices),
+        None => None,
+    };
+    // The mantissas are taken as they are, as all but Radiance itself do (it adds one half).
+    move |[r, g, b, e]| {
+        let scale = scales[e as usize];
         let rgb = [f32::from(r) * scale[0], f32::from(g) * scale[1], f32::from(b) * scale[2]];
-        self.to_rec709.map_or(rgb, |matrix| (matrix * Vec3::from(rgb)).to_array())
+        to_rec709.map_or(rgb, |matrix| (matrix * Vec3::from(rgb)).to_array())
     }
 }
 
