@@ -286,16 +286,12 @@ impl<'a> File<'a> {
             return Err(format!("holds too few pixels for {} rows", self.height));
         }
         let mut pixels = memory::reserved(self.count())?;
-        let (mut plain, mut packed);
-        let source: &mut dyn Read = if is_packed {
-            packed = unpacked()?;
-            &mut packed
-        } else {
-            plain = self.level;
-            &mut plain
+        let mut source: Box<dyn Read> = match is_packed {
+            true => Box::new(unpacked()?),
+            false => Box::new(self.level),
         };
         for row in (0..self.height).step_by(step) {
-            read(source, step.min(self.height - row), &mut pixels).map_err(damaged)?;
+            read(&mut source, step.min(self.height - row), &mut pixels).map_err(damaged)?;
         }
         Ok(pixels)
     }
