@@ -211,12 +211,9 @@ fn decode(bytes: &[u8]) -> Decoded<(FilmFacts, Film)> {
         return Err(DAMAGED.into());
     }
     memory::check(content.len() as u64)?;
-    let film = Film::of_pixels(
-        [width, height],
-        in_rows(of_pixels).map(pixel_of_words).collect(),
-        in_rows(of_surfaces).map(|words| Surface::of_sums(words.map(f64::from_bits))).collect(),
-    );
-    Ok((header.facts, film))
+    let pixels = in_rows(of_pixels).map(pixel_of_words).collect();
+    let surfaces = in_rows(of_surfaces).map(|words| Surface::of_sums(words.map(f64::from_bits)));
+    Ok((header.facts, Film { width, height, pixels, surfaces: surfaces.collect() }))
 }
 
 /// Little-endian words, so many at a time.

@@ -48,9 +48,10 @@ pub struct Film {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    pub(super) pixels: Vec<Pixel>,
+    /// Sums, row after row.
+    pub(crate) pixels: Vec<Pixel>,
     /// Empty unless layers are asked for.
-    pub(super) surfaces: Vec<Surface>,
+    pub(crate) surfaces: Vec<Surface>,
 }
 
 impl Pixel {
@@ -186,15 +187,6 @@ impl Film {
             pixels: vec![Pixel::default(); count],
             surfaces: vec![Surface::default(); if layers { count } else { 0 }],
         }
-    }
-
-    /// Of sums, row after row; no surfaces without layers.
-    pub(crate) fn of_pixels(
-        [width, height]: [u32; 2],
-        pixels: Vec<Pixel>,
-        surfaces: Vec<Surface>,
-    ) -> Self {
-        Self { width, height, pixels, surfaces }
     }
 
     /// Counts so many samples of every pixel more, without their light: others take them. Only for

@@ -160,7 +160,7 @@ pub(crate) fn mixed(films: &[(&Film, f32)]) -> Film {
     };
     let surfaces = first.surfaces().par_iter().zip(&pixels).zip(first.pixels()).map(scaled);
     let surfaces = surfaces.collect();
-    Film::of_pixels([first.width, first.height], pixels, surfaces)
+    Film { width: first.width, height: first.height, pixels, surfaces }
 }
 
 #[cfg(test)]
