@@ -72,15 +72,11 @@ impl PreparedRow {
     /// If it does not fit.
     pub(super) fn upload(&mut self, device: &OpenDevice) -> Result<()> {
         let Some(gpu) = &device.gpu else { return Ok(()) };
-        let mut uploads: Vec<gpu::UploadedScene> = Vec::new();
-        for light in &self.lights {
-            uploads.push(match uploads.first() {
-                Some(first) => first.relit(&light.environment)?,
-                None => gpu::UploadedScene::new(gpu, &self.world, &light.environment)?,
-            });
-        }
-        for (light, upload) in self.lights.iter_mut().zip(uploads) {
-            light.upload = Some(upload);
+        let Some((first, others)) = self.lights.split_first_mut() else { return Ok(()) };
+        let uploaded = gpu::UploadedScene::new(gpu, &self.world, &first.environment)?;
+        let uploaded = first.upload.insert(uploaded);
+        for light in others {
+            light.upload = Some(uploaded.relit(&light.environment)?);
         }
         Ok(())
     }

@@ -286,7 +286,7 @@ impl<'a> SurfacePoint<'a> {
         let shading_frame = Frame::from_z(normal.normalize());
         let is_opaque = parameters.transmission <= 0.0 && parameters.diffuse_transmission <= 0.0;
         let lift = match normals {
-            Some(normals) if is_opaque => {
+            Some(normals) if is_opaque && is_tilted(unmapped, geometric_normal) => {
                 corner.lift(position, [a, b, c], normals, unmapped, geometric_normal)
             }
             _ => 0.0,
@@ -447,9 +447,6 @@ impl<'a> Corner<'a> {
         smooth: Vec3,
         geometric: Vec3,
     ) -> f32 {
-        if !is_tilted(smooth, geometric) {
-            return 0.0;
-        }
         let side = 1.0_f32.copysign(smooth.dot(geometric));
         self.blend([0, 1, 2].map(|i| {
             let normal = normals[i] * side;
