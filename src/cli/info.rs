@@ -112,9 +112,8 @@ fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
         match value {
             Value::Array(texts) if !is_names && texts.iter().any(Value::is_string) => {
                 lines.push(format!("{:indent$}{label}:", ""));
-                for text in texts.iter().filter_map(Value::as_str) {
-                    lines.push(format!("{:indent$}  - {}", "", one_line(text)));
-                }
+                let texts = texts.iter().filter_map(Value::as_str);
+                lines.extend(texts.map(|text| format!("{:indent$}  - {}", "", one_line(text))));
             }
             Value::Array(items) if is_names || !items.is_empty() => {
                 let texts: Vec<String> = items.iter().map(number).collect();

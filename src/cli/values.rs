@@ -122,11 +122,8 @@ pub(super) fn corners(text: &str) -> Result<[Vec3; 2], String> {
         return Err("expected six numbers: the lower and the upper corner".to_owned());
     };
     let (low, high) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
-    if low.cmplt(high).all() {
-        Ok([low, high])
-    } else {
-        Err("the first corner must be the lower one along every axis".to_owned())
-    }
+    let corners = low.cmplt(high).all().then_some([low, high]);
+    corners.ok_or_else(|| "the first corner must be the lower one along every axis".to_owned())
 }
 
 /// A whole number in a range.

@@ -319,10 +319,8 @@ impl Film {
     /// Mean luminance of every pixel and those around it. What a pixel's error is measured against must
     /// not be its own mean: a lone bright sample raises both, and would hide.
     pub(crate) fn luminance_around(&self) -> Vec<f64> {
-        (0..self.pixels.len())
-            .into_par_iter()
-            .map(|index| self.luminance_around_one(index))
-            .collect()
+        let of_one = |index| self.luminance_around_one(index);
+        (0..self.pixels.len()).into_par_iter().map(of_one).collect()
     }
 
     fn luminance_around_one(&self, index: usize) -> f64 {

@@ -131,10 +131,7 @@ fn farthest(frame: Frame, film: &Film) -> Vec<f32> {
 
 /// How far away, in units of the scene, each pixel's surfaces are; infinite where none was met.
 fn depths_of(frame: Frame, film: &Film) -> Vec<f32> {
-    let depth = |index| match film.surface_of(index) {
-        Some((.., depth)) => frame.length(depth),
-        None => f32::INFINITY,
-    };
+    let depth = |index| film.surface_of(index).map_or(f32::INFINITY, |(.., z)| frame.length(z));
     (0..film.pixels().len()).into_par_iter().map(depth).collect()
 }
 

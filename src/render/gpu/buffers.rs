@@ -245,15 +245,8 @@ impl Buffers {
             at += bytes;
         }
         let taken = self.gpu.read_staged(&staging, bytes, commands, |mut rest| {
-            let slices: Vec<&[u8]> = parts
-                .iter()
-                .map(|(.., bytes)| {
-                    let (part, others) = rest.split_at(*bytes as usize);
-                    rest = others;
-                    part
-                })
-                .collect();
-            take(&slices)
+            let part = |bytes: u64| rest.split_off(..bytes as usize).expect("all were copied");
+            take(&parts.iter().map(|(.., bytes)| *bytes).map(part).collect::<Vec<_>>())
         })?;
         self.bytes_read.fetch_add(bytes, Ordering::Relaxed);
         *self.staging.lock().unwrap_or_else(PoisonError::into_inner) = Some(staging);
@@ -263,10 +256,8 @@ impl Buffers {
     /// A buffer the host can read, kept from one reading to the next. It is made anew after a failure.
     fn staging(&self, bytes: u64) -> Result<Buffer> {
         let kept = self.staging.lock().unwrap_or_else(PoisonError::into_inner).take();
-        match kept.filter(|kept| kept.size() >= bytes) {
-            Some(kept) => Ok(kept),
-            None => self.gpu.make(|_| self.gpu.staging(bytes)),
-        }
+        let kept = kept.filter(|kept| kept.size() >= bytes);
+        kept.map_or_else(|| self.gpu.make(|_| self.gpu.staging(bytes)), Ok)
     }
 
     /// Bytes read back so far.

@@ -305,12 +305,9 @@ impl Gpu {
     /// # Errors
     /// One sentence with the adapter's name.
     pub fn check(&self) -> Result<()> {
-        match self.trouble.lock() {
-            Ok(trouble) => trouble
-                .as_ref()
-                .map_or(Ok(()), |t| Err(Error::new(format!("{}: {t}", self.facts.name)))),
-            Err(_) => Err(Error::new(format!("{}: its state is unknown", self.facts.name))),
-        }
+        let unknown = |_| Some("its state is unknown".to_owned());
+        let trouble = self.trouble.lock().map_or_else(unknown, |trouble| trouble.clone());
+        trouble.map_or(Ok(()), |t| Err(Error::new(format!("{}: {t}", self.facts.name))))
     }
 
     /// Makes something on the device. What it has no room for, or will not take, is an error of that alone: the

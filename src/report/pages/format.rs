@@ -70,10 +70,7 @@ impl Display for SpeedUp {
             (true, false) => "≤ ",
         };
         write!(f, "{bound}{}", ratio(self.ratio))?;
-        match self.interval {
-            Some(i) => write!(f, " [{}, {}]", ratio(i.low), ratio(i.high)),
-            None => Ok(()),
-        }
+        self.interval.map_or(Ok(()), |i| write!(f, " [{}, {}]", ratio(i.low), ratio(i.high)))
     }
 }
 

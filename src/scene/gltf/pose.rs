@@ -225,9 +225,7 @@ fn places(
             true
         });
     }
-    if let Some(cause) = failure {
-        return Err(cause);
-    }
+    failure.map_or(Ok(()), Err)?;
     let looping = document.nodes.len() - visited;
     if looping > 0 {
         return Err(format!("its nodes form a loop: {looping} of them have no root above"));

@@ -149,15 +149,14 @@ impl<'a> Source<'a> {
         }
         let open = |accessor| Elements::open(self.file, accessor, &[Type::Scalar]);
         let indices = self.primitive.indices.map(open).transpose()?;
-        if indices.as_ref().is_some_and(|indices| !indices.is_unsigned()) {
+        let indices = indices.as_ref();
+        if indices.is_some_and(|indices| !indices.is_unsigned()) {
             return Err("its indices are not unsigned integers".into());
         }
-        let corners = indices.as_ref().map_or(vertices, |indices| indices.count);
+        let corners = indices.map_or(vertices, |indices| indices.count);
         check_count(corners.div_ceil(3) as u64, MAX_TRIANGLES, "it has", "triangles")?;
-        let vertex = |corner| match &indices {
-            Some(indices) => indices.integers::<1>(corner)[0],
-            None => corner as u32,
-        };
+        let vertex =
+            |corner| indices.map_or(corner as u32, |indices| indices.integers::<1>(corner)[0]);
         if let Some(corner) = (0..corners).find(|&corner| vertex(corner) as usize >= vertices) {
             return Err(format!("index {} is beyond its {vertices} vertices", vertex(corner)));
         }

@@ -266,10 +266,8 @@ fn source<'a>(file: &'a File<'_>, number: u32) -> Fallible<Source<'a>> {
     if let Some(view) = file.document.images.get_as::<InView>(index)?.buffer_view {
         return Ok(Source::View(view.value() as u32));
     }
-    match uri_of(file.document.images.text(index)?)? {
-        Some(uri) => file.folder.place(uri).map(Source::Uri),
-        None => Err("it has no data".into()),
-    }
+    let uri = uri_of(file.document.images.text(index)?)?.ok_or("it has no data")?;
+    file.folder.place(uri).map(Source::Uri)
 }
 
 impl Source<'_> {
