@@ -78,15 +78,6 @@ impl Learning {
     }
 }
 
-/// Whether rendered paths count when learning paths have been traced.
-fn counts_rendered(world: &World, view: &View) -> bool {
-    view.distribution_options().is_some_and(|options| {
-        let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
-        let is_room = || enclosure(world, view) >= ROOM_ENCLOSURE;
-        options.goes_on() && (is_everywhere || is_room())
-    })
-}
-
 impl Tiles {
     /// Nothing learned yet.
     pub(super) fn new(lit: Lit<'_>, view: &View) -> Self {
@@ -129,10 +120,13 @@ impl Tiles {
         (self.learning, self.learned) = (None, grid);
     }
 
-    /// Ends the tracing of learning paths.
+    /// Ends the tracing of learning paths; rendered ones may count from now on.
     pub(super) fn finish_tracing(&mut self, world: &World, view: &View) {
         if let Some(learning) = self.learning.as_mut().filter(|l| l.stage == Stage::Tracing) {
-            let counts = counts_rendered(world, view);
+            let counts = view.distribution_options().is_some_and(|options| {
+                let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
+                options.goes_on() && (is_everywhere || enclosure(world, view) >= ROOM_ENCLOSURE)
+            });
             learning.stage = if counts { Stage::Counting } else { Stage::Over };
         }
     }
