@@ -139,11 +139,8 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<()> {
         Some(What::Ablations(arguments)) => {
             let effort = effort(&arguments.effort, || vec![Device::Cpu]);
             let places = &arguments.places;
-            let rows = if places.scenes.is_empty() && places.env.is_empty() {
-                Vec::new()
-            } else {
-                rows(places)
-            };
+            let is_usual = places.scenes.is_empty() && places.env.is_empty();
+            let rows = if is_usual { Vec::new() } else { rows(places) };
             let plan = ablations::plan(rows, &arguments.only, effort, command);
             if plan.methods.len() == 2 {
                 return Err(Error::new(format!(

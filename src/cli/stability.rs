@@ -107,9 +107,8 @@ fn conclude(reports: &[CaseReport]) -> Result<()> {
     let seconds: f64 = reports.iter().map(|report| report.seconds).sum();
     print(format_args!("{passed} passed, {failed} failed, {skipped} skipped in {seconds:.0} s"))?;
     let failed: Vec<&str> = of(Verdict::Failed).map(|report| report.title.as_str()).collect();
-    if failed.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::new(format!("failed: {}", failed.join(", "))))
+    match &failed[..] {
+        [] => Ok(()),
+        failed => Err(Error::new(format!("failed: {}", failed.join(", ")))),
     }
 }

@@ -28,10 +28,9 @@ pub(super) fn copies(
     hash: impl Fn(usize) -> u32 + Sync,
     is_copy: impl Fn(usize, usize) -> bool,
 ) -> Vec<(usize, usize)> {
-    let mut candidates: Vec<(u32, usize)> = if count < FEW {
-        (0..count).map(|number| (hash(number), number)).collect()
-    } else {
-        candidates(count, &hash)
+    let mut candidates: Vec<(u32, usize)> = match count < FEW {
+        true => (0..count).map(|number| (hash(number), number)).collect(),
+        false => candidates(count, &hash),
     };
     candidates.par_sort_unstable();
     let mut found = Vec::new();
@@ -105,10 +104,8 @@ impl Scene {
     /// The mesh that a triangle is of, counted from 1; 0 is the world.
     pub(super) fn owner(&self, place: usize) -> usize {
         let meshes = self.instances.meshes();
-        match place < self.own_triangles().end as usize {
-            true => 0,
-            false => 1 + meshes.partition_point(|mesh| mesh.end as usize <= place),
-        }
+        let is_own = place < self.own_triangles().end as usize;
+        if is_own { 0 } else { 1 + meshes.partition_point(|mesh| mesh.end as usize <= place) }
     }
 
     /// Removes all other triangles.

@@ -146,10 +146,8 @@ impl Dispatcher {
     /// one no time may take a small one so long that a desktop stutters.
     pub(super) fn min_tiles(&self, units: u64) -> u64 {
         let [small, large] = MIN_TILES;
-        match self.gpu.facts().is_software() {
-            true => MIN_TILES_ON_SOFTWARE,
-            false => units.clamp(small, large),
-        }
+        let is_software = self.gpu.facts().is_software();
+        if is_software { MIN_TILES_ON_SOFTWARE } else { units.clamp(small, large) }
     }
 
     /// Waits until the device has nothing more to do.

@@ -99,8 +99,6 @@ impl HostFilm {
 
 /// The film; a black one of the view in place of one that has no pixels yet.
 fn with_pixels(film: Film, view: &View) -> Film {
-    match film.pixels().is_empty() {
-        true => Film::new(view.width, view.height, view.layers),
-        false => film,
-    }
+    let is_empty = film.pixels().is_empty();
+    if is_empty { Film::new(view.width, view.height, view.layers) } else { film }
 }

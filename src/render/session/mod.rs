@@ -517,9 +517,7 @@ impl<'a> Session<'a> {
         let paths = samples.div_ceil(u64::from(stride));
         let whole = (state.samples >= target).then_some(state.samples);
         let (environment, figures) = (self.environment, &mut state.figures);
-        match state.tiles.note_rendered(paths, whole, environment, figures) {
-            true => self.take_up_distributions(),
-            false => Ok(()),
-        }
+        let are_new = state.tiles.note_rendered(paths, whole, environment, figures);
+        if are_new { self.take_up_distributions() } else { Ok(()) }
     }
 }

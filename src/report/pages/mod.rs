@@ -52,11 +52,8 @@ struct Csv<'a> {
 
 /// A field as RFC 4180 wants it.
 fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+    let is_quoted = text.contains([',', '"', '\n']);
+    if is_quoted { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 /// A title as the name of a file.

@@ -18,10 +18,8 @@ const STEP: u64 = 1 << 26;
 
 /// Whether there is memory for so many more bytes of what grows bit by bit.
 pub(super) fn check_growth(present: u64, added: u64) -> Fallible<()> {
-    match present / STEP == present.saturating_add(added) / STEP {
-        true => Ok(()),
-        false => memory::check(added.max(STEP)),
-    }
+    let is_asked = present / STEP != present.saturating_add(added) / STEP;
+    if is_asked { memory::check(added.max(STEP)) } else { Ok(()) }
 }
 
 /// A result whose error is the cause alone; the file's name is put before it in one place.

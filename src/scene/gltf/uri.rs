@@ -90,10 +90,8 @@ impl Folder<'_> {
             Some(other) => format!(": {cause}; there is {other}"),
             None => format!(": {cause}"),
         })?;
-        if !self.allow_outside && !file.starts_with(real) {
-            return Err(OUTSIDE.into());
-        }
-        Ok(file)
+        let is_refused = !self.allow_outside && !file.starts_with(real);
+        if is_refused { Err(OUTSIDE.into()) } else { Ok(file) }
     }
 }
 
@@ -184,10 +182,8 @@ pub(super) fn shown(uri: &str) -> String {
     if is_data(uri) {
         return "data URI".to_owned();
     }
-    match uri.char_indices().nth(MAX_SHOWN) {
-        Some((end, _)) => format!("{}...", &uri[..end]),
-        None => uri.to_owned(),
-    }
+    let end = uri.char_indices().nth(MAX_SHOWN);
+    end.map_or_else(|| uri.to_owned(), |(end, _)| format!("{}...", &uri[..end]))
 }
 
 fn read_data_uri(uri: &str) -> Fallible<Vec<u8>> {
