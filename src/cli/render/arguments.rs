@@ -378,10 +378,8 @@ impl RenderArguments {
     /// Says what is asked of a fog that there is not.
     pub(super) fn check_fog(&self, scene: &Scene, notices: &mut Notices) {
         let is_shaped = self.fog_anisotropy.is_some() || self.fog_box.is_some();
-        let medium = self.medium(scene);
-        let is_clear =
-            |medium: &Medium| (medium.scattering, medium.absorption) == Default::default();
-        if is_shaped && medium.as_ref().is_some_and(is_clear) {
+        let is_clear = |air: Medium| (air.scattering, air.absorption) == Default::default();
+        if is_shaped && self.medium(scene).is_some_and(is_clear) {
             notices.add("--fog-box and --fog-anisotropy change nothing: the air is clear (--fog, --fog-absorption)");
         }
     }
