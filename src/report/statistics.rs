@@ -188,21 +188,13 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
     if smaller < 2 {
         return None;
     }
-    let mut state = 0;
+    let mut states = 1..;
     let mut draw = |count: usize| -> Vec<usize> {
-        (0..count)
-            .map(|_| {
-                state += 1;
-                ((u64::from(hash(state)) * count as u64) >> 32) as usize
-            })
-            .collect()
+        let of_state = |state| ((u64::from(hash(state)) * count as u64) >> 32) as usize;
+        states.by_ref().take(count).map(of_state).collect()
     };
-    let mut values: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let (a, b) = (draw(counts[0]), draw(counts[1]));
-            statistic([&a, &b])
-        })
-        .collect();
+    let resample = |_| statistic(counts.map(&mut draw).each_ref().map(Vec::as_slice));
+    let mut values: Vec<f64> = (0..RESAMPLES).map(resample).collect();
     if !values.iter().all(|v| v.is_finite()) {
         return None;
     }
