@@ -183,10 +183,9 @@ fn search_distribution(sums: &[f64]) -> Vec<f64> {
         sums: &[f64],
         first: usize,
         last: usize,
-        interval: [f64; 2],
+        [low, high]: [f64; 2],
         distribution: &mut [f64],
     ) {
-        let [low, high] = interval;
         if high <= low {
             return;
         }

@@ -73,10 +73,9 @@ impl TileLocal {
         let (mut row_rest, mut tile_rest) = (&mut row_sums[..], &mut tile_sums[..]);
         let mut jobs = Vec::with_capacity(tiles.len());
         for (patches, energy) in tiles.into_iter().zip(&mut energies) {
-            let (row_part, rest) = row_rest.split_at_mut(patches.len());
-            row_rest = rest;
-            let (tile_part, rest) = tile_rest.split_at_mut(patches.height() as usize);
-            tile_rest = rest;
+            let row_part = row_rest.split_off_mut(..patches.len()).unwrap_or_default();
+            let tile_part = tile_rest.split_off_mut(..patches.height() as usize);
+            let tile_part = tile_part.unwrap_or_default();
             jobs.push((patches, row_part, tile_part, energy));
         }
         jobs.into_par_iter().for_each_init(

@@ -375,9 +375,7 @@ impl BlockDecoder {
             for row in 0..height {
                 for (&(_, step, bytes), plane) in lines.iter().zip(&mut planes) {
                     if has_samples(row, step) {
-                        let (line, after) = plane.split_at_checked(bytes).ok_or_else(damaged)?;
-                        data.extend_from_slice(line);
-                        *plane = after;
+                        data.extend_from_slice(plane.split_off(..bytes).ok_or_else(damaged)?);
                     }
                 }
             }
@@ -398,8 +396,7 @@ impl BlockDecoder {
         let mut rest = data.as_slice();
         for (row, line) in pixels.chunks_exact_mut(width).enumerate() {
             for &(channel, step, bytes) in of_row(row) {
-                let (samples, after) = rest.split_at_checked(bytes).ok_or_else(damaged)?;
-                rest = after;
+                let samples = rest.split_off(..bytes).ok_or_else(damaged)?;
                 for i in (0..3).filter(|i| self.channels.indices().get(*i) == Some(&channel)) {
                     for_each(self.layout[channel].0, width / step[0], samples, |x, v| {
                         line[x * step[0]..][..step[0]].iter_mut().for_each(|pixel| pixel[i] = v);
@@ -471,8 +468,7 @@ fn planes_of_b44(
         } else {
             length = line_bytes * size.1;
         }
-        let (own, after) = rest.split_at_checked(length)?;
-        rest = after;
+        let own = rest.split_off(..length)?;
         let mut alone = header.clone();
         alone.channels = ChannelList::new(std::iter::once(channel).collect());
         let (own, section) = (own.to_vec(), IntegerBounds { position: Vec2(0, 0), size });

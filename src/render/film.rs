@@ -420,11 +420,10 @@ impl Film {
             for tile in &mut tiles[tile_row * columns..(tile_row + 1) * columns] {
                 let end = (tile.corner[0] + i64::from(width)) as usize;
                 let length = end.min(row_length) - tile.first()[0] as usize;
-                let (own, rest) = pixels.split_at_mut(length);
-                let (own_surfaces, rest_surfaces) =
-                    surfaces.split_at_mut(if surfaces.is_empty() { 0 } else { length });
+                let own = pixels.split_off_mut(..length).unwrap_or_default();
+                // There are none without layers.
+                let own_surfaces = surfaces.split_off_mut(..length).unwrap_or_default();
                 tile.rows.push((own, own_surfaces));
-                (pixels, surfaces) = (rest, rest_surfaces);
             }
         }
         tiles

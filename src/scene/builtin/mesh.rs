@@ -174,7 +174,6 @@ impl Builder {
     pub(super) fn slab(&mut self, mat: Mat, lo: [f32; 3], hi: [f32; 3], bevel: f32) {
         let (lo, hi) = (Vec3::from(lo), Vec3::from(hi));
         let bevel = bevel.min(0.49 * (hi - lo).min_element());
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         let offset = Vec2::new(lo.x * 1.7 + lo.z * 0.6, lo.y + lo.z * 2.3);
         // A corner of the box as a vertex of its face across `axis`.
         let at = |corner: usize, axis: usize| {
@@ -184,7 +183,7 @@ impl Builder {
                 p[k] = if corner >> k & 1 == 1 { hi[k] - inset } else { lo[k] + inset };
             }
             let sign = if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-            (p, axes[axis] * sign)
+            (p, Vec3::AXES[axis] * sign)
         };
         let uv = |p: Vec3, axis: usize| {
             let (mut b, mut c) = ((axis + 1) % 3, (axis + 2) % 3);
