@@ -123,11 +123,12 @@ impl Carried {
         self.last = Whole::new(snapshot, image);
     }
 
-    /// Lets go of pictures of another scene, or under another light.
+    /// Lets go of pictures of another scene, or under another light, and of surfaces that are not seen any more.
     fn leave_others(&mut self, request: &Request) {
         for whole in [&mut self.last, &mut self.before] {
             whole.take_if(|whole| !whole.request.is_seen_like(request));
         }
+        self.fine.take_if(|(of, _)| !of.has_surfaces_of(request));
     }
 
     /// A picture with what was seen before from elsewhere. A small one of a movement shows only what was not seen, in the
