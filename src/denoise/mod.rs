@@ -89,7 +89,7 @@ impl Denoiser {
     /// time at most that the samples took.
     ///
     /// # Errors
-    /// As [`Self::preview`].
+    /// If the library is missing or fails.
     pub fn finish(self, film: &Film, other: Option<(&Film, f32)>) -> Result<Image> {
         let samples = other.map_or(0, |(other, _)| other.min_samples()) + film.min_samples();
         let is_prefiltered = samples >= PREFILTERED_SAMPLES;
@@ -134,7 +134,7 @@ impl Denoiser {
     }
 }
 
-/// The film's picture through the filter that is always there, as by [`Denoiser::preview`].
+/// The film's picture through the filter that is always there, for the screen.
 pub fn quick(film: &Film, other: Option<(&Film, f32)>) -> Image {
     let image = Denoiser::ATrous.run(film, other, None, (Quality::Fast, &NEVER));
     image.ok().flatten().expect("it neither fails nor is cancelled")

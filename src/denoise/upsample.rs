@@ -68,17 +68,15 @@ struct Quad {
 }
 
 impl Quad {
-    fn new(pixels: [(&Guide, [f32; 3], bool); 4]) -> Self {
-        let each = |of: &dyn Fn(&(&Guide, [f32; 3], bool)) -> f32| {
-            Vec4::from(std::array::from_fn(|i| of(&pixels[i])))
-        };
+    fn new(guides: [&Guide; 4], colors: [[f32; 3]; 4], edited: [bool; 4]) -> Self {
+        let each = |of: &dyn Fn(usize) -> f32| Vec4::from(std::array::from_fn(of));
         Self {
-            albedo: [0, 1, 2].map(|i| each(&|(guide, ..)| guide.albedo[i])),
-            coverage: each(&|(guide, ..)| guide.coverage),
-            normal: [0, 1, 2].map(|i| each(&|(guide, ..)| guide.normal[i])),
-            nearness: each(&|(guide, ..)| guide.nearness),
-            light: [0, 1, 2].map(|i| each(&|(guide, color, _)| color[i] / guide.albedo[i])),
-            edited: each(&|(.., is_edited)| f32::from(u8::from(*is_edited))),
+            albedo: [0, 1, 2].map(|i| each(&|at| guides[at].albedo[i])),
+            coverage: each(&|at| guides[at].coverage),
+            normal: [0, 1, 2].map(|i| each(&|at| guides[at].normal[i])),
+            nearness: each(&|at| guides[at].nearness),
+            light: [0, 1, 2].map(|i| each(&|at| colors[at][i] / guides[at].albedo[i])),
+            edited: each(&|at| f32::from(u8::from(edited[at]))),
         }
     }
 
@@ -155,8 +153,9 @@ impl FineGuides {
             let [x, y] = [index % size[0], index / size[0]];
             let [right, below] = [(x + 1).min(size[0] - 1), (y + 1).min(size[1] - 1)];
             let at = |column: usize, row: usize| row * size[0] + column;
-            let pixels = [at(x, y), at(right, y), at(x, below), at(right, below)];
-            Quad::new(pixels.map(|at| (&guides[at], small.pixels[at], edited[at])))
+            let four = [at(x, y), at(right, y), at(x, below), at(right, below)];
+            let colors = four.map(|at| small.pixels[at]);
+            Quad::new(four.map(|at| &guides[at]), colors, four.map(|at| edited[at]))
         };
         let quads: Vec<Quad> = (0..guides.len()).into_par_iter().map(quad).collect();
         // The quad around a place along an axis, and how far beyond its first pixel that is.

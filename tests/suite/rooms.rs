@@ -78,7 +78,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("bvh", 1386),
     ("cli", 3445),
     ("color", 27),
-    ("denoise", 1235),
+    ("denoise", 1234),
     ("develop", 413),
     ("digest", 90),
     ("environment", 1770),
