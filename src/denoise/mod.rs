@@ -110,12 +110,12 @@ impl Denoiser {
         let filter = |film: &Film, other, every: u32| -> Result<Option<Image>> {
             let samples = &Samples::of(film, other);
             let fine = fine.filter(|fine| film.has_layers() && film.width < fine.width);
+            let restored = |image| samples.restored(image);
             let image = match self.found() {
                 Self::ATrous if !film.has_layers() => Some(film.image()),
-                Self::ATrous => a_trous::denoise(samples, cancel),
-                _ => oidn::denoise(samples, quality, cancel)?,
+                Self::ATrous => a_trous::denoise(samples, cancel).map(restored),
+                _ => oidn::denoise(samples, quality, cancel)?.map(restored),
             };
-            let image = image.map(|image| samples.restored(image));
             Ok(image.map(|image| match fine {
                 Some(fine) => fine.upsampled(samples, &image, size.map(|side| side / every as f32)),
                 None if every > 1 => image.enlarged(every, [width, height]),
