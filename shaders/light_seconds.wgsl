@@ -84,9 +84,8 @@ fn begin_estimate(group: u32, lane: u32) {
     let arrived = seconds[at + 1u];
     let direction = float3(arrived);
     let member = member_of(globals.work.first * TILES_OF_GROUP + owner / OWNERS, hit.w & 63u);
-    let pixel = member.place.y * globals.width + member.place.x;
-    var sampler =
-        sampler_new(globals.seed, pixel, globals.work.sample - globals.first_of_sequence);
+    let sample = globals.work.sample - globals.first_of_sequence;
+    var sampler = sampler_of_pixel(globals.seed, member.place, sample);
     sampler.pair = pair_in(hit.w, 8u);
     sampler = sampler_of_estimate(sampler, CONTINUATIONS, estimate);
     var path = path_new(Ray(vec3f(0.0), direction, F32_MAX), sampler);

@@ -8,7 +8,7 @@ fn pixel_in_tile(tile: u32, lane: u32) -> vec2u {
 
 fn start_sample(x: u32, y: u32, index: u32) -> Path {
     var sampler =
-        sampler_new(globals.seed, y * globals.width + x, index - globals.first_of_sequence);
+        sampler_of_pixel(globals.seed, vec2u(x, y), index - globals.first_of_sequence);
     let offset = filter_sample(next_pair(&sampler));
     let lens = lens_point(&sampler);
     let centre = vec2f(f32(x) + 0.5, f32(y) + 0.5);

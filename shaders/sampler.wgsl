@@ -2,30 +2,48 @@
 
 struct Sampler {
     reversed_index: u32,
-    pixel_seed: u32,
+    sequence_seed: u32,
     pair: u32,
 }
 
-fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
-    let pixel_seed = hash(hash(pixel) + hash(seed));
-    return Sampler(reverseBits(index), pixel_seed, 0u);
+// Bits of a reversed index that choose a digital shift.
+const SHIFT = 255u;
+
+fn sampler_new(seed: u32, sequence: u32, index: u32) -> Sampler {
+    let sequence_seed = hash(hash(sequence) + hash(seed));
+    return Sampler(reverseBits(index), sequence_seed, 0u);
+}
+
+fn sampler_of_pixel(seed: u32, pixel: vec2u, index: u32) -> Sampler {
+    let low = pixel & vec2u(15u);
+    let pairs = (low | (low << vec2u(2u))) & vec2u(0x33u);
+    let spread = (pairs | (pairs << vec2u(1u))) & vec2u(0x55u);
+    let place = spread.x | (spread.y << 1u);
+    let tile = pixel >> vec2u(4u);
+    return sampler_new(seed, (tile.y << 16u) | tile.x, index ^ (place << 24u));
 }
 
 // The stream of one of `count` estimates that the sample makes of the same thing.
 fn sampler_of_estimate(sampler: Sampler, count: u32, estimate: u32) -> Sampler {
     let pair = sampler.pair + (count - 1u) * PAIRS_OF_ESTIMATES;
-    let index = reverseBits(sampler.reversed_index) * count + estimate;
-    return Sampler(reverseBits(index), sampler.pixel_seed, pair);
+    let index = reverseBits(sampler.reversed_index & ~SHIFT) * count + estimate;
+    let reversed = reverseBits(index) ^ (sampler.reversed_index & SHIFT);
+    return Sampler(reversed, sampler.sequence_seed, pair);
 }
 
 fn next_pair_bits(sampler: ptr<function, Sampler>) -> vec2u {
-    let seed = hash((*sampler).pixel_seed + (*sampler).pair * 0x9e3779b9u);
+    let seed = hash((*sampler).sequence_seed + (*sampler).pair * 0x9e3779b9u);
     (*sampler).pair += 1u;
-    let shuffled = reverseBits(owen_scramble_reversed((*sampler).reversed_index, seed));
-    let point = sobol_reversed(shuffled);
+    let index = (*sampler).reversed_index;
+    let mixed = mixed_place(index & SHIFT, seed);
+    let place = reverseBits(owen_scramble_reversed(mixed, ~seed)) >> 24u;
+    let point = reverseBits(owen_scramble_reversed(index & ~SHIFT, seed));
+    // One after the other: fewer registers are taken than for both at once.
+    let x = point ^ (place * 0x9e3779b9u);
+    let y = second_dimension(point) ^ (second_dimension(place) * 0x85ebca6bu);
     return vec2u(
-        reverseBits(owen_scramble_reversed(point.x, hash(seed ^ 0x5851f42du))),
-        reverseBits(owen_scramble_reversed(point.y, hash(seed ^ 0x14057b7eu))),
+        reverseBits(owen_scramble_reversed(x, hash(seed ^ 0x5851f42du))),
+        reverseBits(owen_scramble_reversed(y, hash(seed ^ 0x14057b7eu))),
     );
 }
 
@@ -56,12 +74,16 @@ fn owen_scramble_reversed(value: u32, seed: u32) -> u32 {
     return x ^ (x * 0x53a22864u);
 }
 
-fn sobol_reversed(index: u32) -> vec2u {
+fn mixed_place(place: u32, seed: u32) -> u32 {
+    return place ^ ((place >> 1u) & seed & 0x70u) ^ ((place >> 2u) & (seed >> 8u) & 0x30u);
+}
+
+fn second_dimension(index: u32) -> u32 {
     var y = index;
     y ^= y >> 16u;
     y ^= (y >> 8u) & 0x00ff00ffu;
     y ^= (y >> 4u) & 0x0f0f0f0fu;
     y ^= (y >> 2u) & 0x33333333u;
     y ^= (y >> 1u) & 0x55555555u;
-    return vec2u(index, y);
+    return y;
 }

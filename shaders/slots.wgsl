@@ -179,7 +179,7 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     slot_write(slot, THROUGHPUT, (*path).throughput, bitcast<u32>((*path).travelled));
     let sampler = (*path).sampler;
     slots[slot + 64u * SAMPLER] =
-        vec4u(sampler.reversed_index, sampler.pixel_seed, sampler.pair, vertices_of(path));
+        vec4u(sampler.reversed_index, sampler.sequence_seed, sampler.pair, vertices_of(path));
     var what = GOES_ON;
 //#if COUNTING
     what |= select(0u, IS_COUNTED, (*path).is_counted);

@@ -152,7 +152,7 @@ impl Task<'_> {
     fn start(&self, [x, y]: [u32; 2], sample: u32) -> (Ray, Sampler, &PathTracer<'_>) {
         let view = self.view;
         let index = y * view.width + x;
-        let mut sampler = self.pass.sequence.sampler(view.points, view.seed, index, sample);
+        let mut sampler = self.pass.sequence.sampler(view.points, view.seed, [x, y], sample);
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
         let lens = lens_point(&self.rays, &mut sampler);
         let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);

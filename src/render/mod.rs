@@ -41,4 +41,4 @@ pub(crate) use view_probe::cut_off_notice;
 
 /// Version of what samples are made of: raised when a picture of the same options and seed is another than before.
 /// Parts and checkpoints of other versions are refused.
-pub const SAMPLES_VERSION: u32 = 5;
+pub const SAMPLES_VERSION: u32 = 6;

@@ -37,12 +37,10 @@ impl<'a> FloorReference<'a> {
         let pixel = |index: u32| {
             let sum: f64 = (0..samples)
                 .map(|sample| {
-                    let mut sampler = Sampler::new(view.seed, index, sample);
-                    let [x, y] = sampler.next_pair().map(f64::from);
-                    let at = DVec2::new(
-                        f64::from(index % view.width) + x,
-                        f64::from(index / view.width) + y,
-                    );
+                    let place = [index % view.width, index / view.width];
+                    let mut sampler = Sampler::of_pixel(view.seed, place, sample);
+                    let offset = sampler.next_pair().map(f64::from);
+                    let at = DVec2::from(place.map(f64::from)) + DVec2::from(offset);
                     self.radiance(direction(&rays, view, at), sampler)
                 })
                 .sum();

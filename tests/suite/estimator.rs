@@ -3,6 +3,7 @@
 //! Known answers first, then agreement of the sampling modes with each other, then that the same
 //! seed gives the same bits, then bounds on memory and odd input.
 
+mod block_noise;
 mod bounds;
 mod cached;
 mod few_samples;

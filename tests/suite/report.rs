@@ -123,7 +123,7 @@ fn independent_points_are_even_in_no_more_than_number() {
     for pixel in 0..128_u32 {
         let mut cells = [0.0_f64; 256];
         for index in 0..samples / 128 {
-            let mut sampler = Points::Independent.sampler(3, pixel, index);
+            let mut sampler = Points::Independent.sampler(3, [pixel, 0], index);
             sampler.next_pair();
             let [x, y] = sampler.next_pair();
             cells[(x * 16.0) as usize * 16 + (y * 16.0) as usize] += 1.0;

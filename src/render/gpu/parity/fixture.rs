@@ -103,7 +103,7 @@ pub(in super::super) fn instanced(scene: Scene) -> Scene {
 impl Fixture {
     /// A sample's camera ray and random numbers, as `render::cpu` starts it.
     pub(super) fn start_sample(&self, pixel: UVec2, index: u32) -> (Ray, Sampler) {
-        let mut sampler = Sampler::new(self.view.seed, pixel.y * self.view.width + pixel.x, index);
+        let mut sampler = Sampler::of_pixel(self.view.seed, pixel.to_array(), index);
         let offset = self.view.filter.sample(Vec2::from(sampler.next_pair()));
         let lens = if self.rays.has_lens() { Vec2::from(sampler.next_pair()) } else { Vec2::ZERO };
         (self.rays.ray(pixel.as_vec2() + 0.5 + offset, lens), sampler)

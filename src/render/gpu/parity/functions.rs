@@ -220,10 +220,13 @@ fn random_points() -> Vec<Probe<'static>> {
             var estimate = sampler_of_estimate(sampler, 3u, 2u);
             put_word(next_pair_bits(&estimate).y);
             estimate = sampler_of_estimate(sampler, 1u, 0u);
-            put_word(next_pair_bits(&estimate).y);",
+            put_word(next_pair_bits(&estimate).y);
+            var of_pixel = sampler_of_pixel(seed, vec2u(pixel & 0xffffu, pixel >> 16u), 5u);
+            put_word(next_pair_bits(&of_pixel).x);",
             cases(indices, |r| case(&[&r.word(), &r.word(), &(r.word() >> r.below(32))])),
             |t| {
-                let mut sampler = Sampler::new(t.take_word(), t.take_word(), t.take_word());
+                let [seed, pixel, index] = [t.take_word(), t.take_word(), t.take_word()];
+                let mut sampler = Sampler::new(seed, pixel, index);
                 for _ in 0..3 {
                     sampler.next_pair_bits().into_iter().for_each(|bits| t.same(bits));
                 }
@@ -231,6 +234,8 @@ fn random_points() -> Vec<Probe<'static>> {
                 t.near(Vec2::from(sampler.next_pair()), EXACT);
                 t.same(sampler.of_estimate(3, 2).next_pair_bits()[1]);
                 t.same(sampler.of_estimate(1, 0).next_pair_bits()[1]);
+                let place = [pixel & 0xffff, pixel >> 16];
+                t.same(Sampler::of_pixel(seed, place, 5).next_pair_bits()[0]);
             },
         ),
         Probe::new(
