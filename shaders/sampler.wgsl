@@ -38,7 +38,6 @@ fn next_pair_bits(sampler: ptr<function, Sampler>) -> vec2u {
     let mixed = mixed_place(index & SHIFT, seed);
     let place = reverseBits(owen_scramble_reversed(mixed, ~seed)) >> 24u;
     let point = reverseBits(owen_scramble_reversed(index & ~SHIFT, seed));
-    // One after the other: fewer registers are taken than for both at once.
     let x = point ^ (place * 0x9e3779b9u);
     let y = second_dimension(point) ^ (second_dimension(place) * 0x85ebca6bu);
     return vec2u(
