@@ -106,11 +106,13 @@ impl Sampler {
     pub fn of_pixel(seed: u32, [x, y]: [u32; 2], index: u32) -> Self {
         // The pixel's low bits, each followed by a zero.
         let spread = |value: u32| {
-            let pairs = (value % TILE | (value % TILE) << 2) & 0x33;
-            (pairs | pairs << 1) & 0x55
+            let low = value % TILE;
+            let pairs = (low | (low << 2)) & 0x33;
+            (pairs | (pairs << 1)) & 0x55
         };
-        let place = spread(x) | spread(y) << 1;
-        Self::new(seed, (y / TILE) << 16 | x / TILE, index ^ place << (32 - SHIFT_BITS))
+        let place = spread(x) | (spread(y) << 1);
+        let tile = ((y / TILE) << 16) | (x / TILE);
+        Self::new(seed, tile, index ^ (place << (32 - SHIFT_BITS)))
     }
 
     /// The stream of one of `count` estimates of the same integral within a sample. The numbers of all estimates of
@@ -195,7 +197,7 @@ fn owen_scramble_reversed(mut x: u32, seed: u32) -> u32 {
 /// it: without this, pixels side by side would take the same half of one pair's unit square where they take the same half of
 /// another's.
 fn mixed_place(place: u32, seed: u32) -> u32 {
-    place ^ (place >> 1 & seed & 0x70) ^ (place >> 2 & seed >> 8 & 0x30)
+    place ^ ((place >> 1) & seed & 0x70) ^ ((place >> 2) & (seed >> 8) & 0x30)
 }
 
 /// Sobol's second dimension of `index`, bits reversed; the first is the index itself. It is the Pascal matrix modulo 2:
@@ -231,7 +233,7 @@ mod tests {
         let mut shapes = 0..=log2;
         shapes.all(|columns| {
             let part = |value: u32, log2: u32| u64::from(value) >> (32 - log2);
-            let cell = |[x, y]: &[u32; 2]| part(*x, columns) << 32 | part(*y, log2 - columns);
+            let cell = |[x, y]: &[u32; 2]| (part(*x, columns) << 32) | part(*y, log2 - columns);
             points.iter().map(cell).collect::<HashSet<_>>().len() == points.len()
         })
     }

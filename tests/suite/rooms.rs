@@ -100,7 +100,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("radiance_cache", 327),
     ("render", 6605),
     ("report", 2840),
-    ("sampler", 168),
+    ("sampler", 170),
     ("scene", 9759),
     ("shaders", 6328),
     ("sources", 133),
