@@ -53,7 +53,7 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Applies each edit to all things of its name, in order.
+/// Applies each edit to all things of its name or, where none has that, to the one of that number, in order.
 ///
 /// # Errors
 /// The first name that nothing has.
@@ -64,13 +64,13 @@ fn change<'n, Thing, Edit>(
     apply: impl Fn(&Edit, &Thing) -> Thing,
 ) -> std::result::Result<(), &'n str> {
     for (name, edit) in edits {
-        let mut is_there = false;
-        for thing in all.iter_mut().filter(|thing| is_called(thing, name)) {
-            *thing = apply(edit, thing);
-            is_there = true;
-        }
-        if !is_there {
+        let named: Vec<_> = (0..all.len()).filter(|i| is_called(&all[*i], name)).collect();
+        let number = name.parse().ok().filter(|number| named.is_empty() && *number < all.len());
+        if named.is_empty() && number.is_none() {
             return Err(name);
+        }
+        for i in named.into_iter().chain(number) {
+            all[i] = apply(edit, &all[i]);
         }
     }
     Ok(())

@@ -37,8 +37,9 @@ pub(super) struct SceneArguments {
     /// Leaves out all that is of the material of this name; may be given several times.
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     hide: Vec<String>,
-    /// Changes all materials of a name: color=#rrggbb, roughness, metalness or opacity=0..1, emission=RADIANCE (each
-    /// multiplies its texture), emission-color=#rrggbb, or hidden; may be given several times.
+    /// Changes all materials of a name or, if none has it, the one of this number, counted from 0: color=#rrggbb,
+    /// roughness, metalness or opacity=0..1, emission=RADIANCE (each multiplies its texture), emission-color=#rrggbb,
+    /// or hidden; may be given several times.
     #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse, help_heading = "Scene")]
     edits: Vec<(String, MaterialEdit)>,
     /// Changes all point, spot and directional lights of a name: factor=NUMBER, color=#rrggbb, or off; may be given

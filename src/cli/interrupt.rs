@@ -10,6 +10,7 @@ use crate::system::{hang_up, on_request_to_end};
 use crate::terminal::{leave_line, notice, tell};
 
 /// What signals set.
+#[derive(Clone, Default)]
 pub(super) struct Interrupt {
     /// Becomes true when the work is to end early. Others may set it, too.
     pub(super) asked: Arc<AtomicBool>,
@@ -18,46 +19,62 @@ pub(super) struct Interrupt {
     has_work: Arc<AtomicBool>,
     /// Where frames are that are to become a video.
     frames: Arc<Mutex<Option<PathBuf>>>,
+    /// What will be done when there is something to keep.
+    what: &'static str,
 }
 
 impl Interrupt {
     /// Watches from now on. `what` says what will be done when there is something to keep.
     pub(super) fn watch(what: &'static str) -> Self {
-        let [asked, signalled, has_work] = [(); 3].map(|()| Arc::<AtomicBool>::default());
-        let flags = [&asked, &signalled, &has_work].map(Arc::clone);
-        let frames = Arc::<Mutex<Option<PathBuf>>>::default();
-        let of_video = Arc::clone(&frames);
-        let watching = on_request_to_end(move |signal| {
-            let [asked, signalled, has_work] = &flags;
-            let was_asked = signalled.load(Ordering::SeqCst);
-            if was_asked && hang_up() == Some(signal) {
-                return;
-            }
-            if was_asked || !has_work.load(Ordering::Relaxed) {
-                if !was_asked {
-                    leave_line();
-                    tell("lightgrid: interrupted before there was anything to keep");
-                }
-                remove_unfinished();
-                let frames = of_video.lock().unwrap_or_else(PoisonError::into_inner).take();
-                match frames.filter(|folder| folder.exists()) {
-                    Some(folder) if was_asked => {
-                        tell(format_args!("the frames are kept in {}", folder.display()));
-                    }
-                    Some(folder) => drop(std::fs::remove_dir_all(folder)),
-                    None => {}
-                }
-                std::process::exit(128 + signal);
-            }
-            signalled.store(true, Ordering::SeqCst);
-            asked.store(true, Ordering::SeqCst);
-            leave_line();
-            tell(format_args!("lightgrid: {what} (again: leave now)"));
-        });
-        if watching.is_err() {
+        let interrupt = Self { what, ..Self::default() };
+        let on_signal = interrupt.clone();
+        if on_request_to_end(move |signal| on_signal.end(signal)).is_err() {
             notice("Ctrl-C cannot be caught here and will end the process at once");
         }
-        Self { asked, signalled, has_work, frames }
+        interrupt
+    }
+
+    /// Takes the end of standard input for a signal, too.
+    pub(super) fn follow_input(&self) {
+        /// That of Ctrl-C.
+        const INTERRUPT: i32 = 2;
+        let interrupt = self.clone();
+        let follow = move || {
+            // What cannot be read has ended.
+            let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+            interrupt.end(INTERRUPT);
+        };
+        if std::thread::Builder::new().name("input".to_owned()).spawn(follow).is_err() {
+            notice("the end of standard input will not end the work: no thread can be started");
+        }
+    }
+
+    /// What a signal does.
+    fn end(&self, signal: i32) {
+        let was_asked = self.was_signalled();
+        if was_asked && hang_up() == Some(signal) {
+            return;
+        }
+        if was_asked || !self.has_work.load(Ordering::Relaxed) {
+            if !was_asked {
+                leave_line();
+                tell("lightgrid: interrupted before there was anything to keep");
+            }
+            remove_unfinished();
+            let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner).take();
+            match frames.filter(|folder| folder.exists()) {
+                Some(folder) if was_asked => {
+                    tell(format_args!("the frames are kept in {}", folder.display()));
+                }
+                Some(folder) => drop(std::fs::remove_dir_all(folder)),
+                None => {}
+            }
+            std::process::exit(128 + signal);
+        }
+        self.signalled.store(true, Ordering::SeqCst);
+        self.asked.store(true, Ordering::SeqCst);
+        leave_line();
+        tell(format_args!("lightgrid: {} (again: leave now)", self.what));
     }
 
     /// From now on there is something to keep.

@@ -1,6 +1,8 @@
-//! The line that says how far it is; when stderr is not a terminal, a new one every minute of rendering.
+//! The line that says how far it is; when stderr is not a terminal, a new one every minute of rendering, or twice a
+//! second for a program that asks for that.
 
 use std::cell::Cell;
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,8 +13,10 @@ use crate::terminal::tell;
 /// A live line on the terminal.
 pub(super) struct Progress {
     bar: ProgressBar,
-    /// What every message begins with.
-    prefix: String,
+    /// The frame it is about, and all.
+    frame: Option<(u32, RangeInclusive<u32>)>,
+    /// Whether a program waits for lines.
+    is_watched: bool,
     /// The error shown, and when it was found.
     error: Cell<Option<(Instant, RelativeError)>>,
     /// When a line was last written for a file or another program, or it was begun.
@@ -22,8 +26,9 @@ pub(super) struct Progress {
 /// What a picture is off by, relative to its light, and what that is called.
 pub(super) type RelativeError = (f64, &'static str);
 
-/// A line is written so often where there is no terminal.
+/// A line is written so often where there is no terminal, and where a program waits for it.
 const LINE_EVERY: Duration = Duration::from_secs(60);
+const WATCHED_EVERY: Duration = Duration::from_millis(500);
 
 /// The error is looked at so often: that takes a look at every pixel, wherever it is.
 const ERROR_EVERY: Duration = Duration::from_secs(2);
@@ -40,18 +45,38 @@ impl Progress {
         if !bar.is_hidden() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Self { bar, prefix: String::new(), error: Cell::default(), written: Instant::now().into() }
+        let (error, written) = (Cell::default(), Instant::now().into());
+        Self { bar, frame: None, is_watched: false, error, written }
+    }
+
+    /// Begins to learn and to render, maybe for a program that waits for lines.
+    pub(super) fn of_picture(is_watched: bool) -> Self {
+        Self { is_watched, ..Self::start("learning") }
     }
 
     /// The next one, which says which of the frames it is about.
-    pub(super) fn of_frame(&self, number: u32, last: u32) -> Self {
-        let (prefix, written) = (format!("frame {number} up to {last}: "), self.written.clone());
-        Self { prefix, written, ..Self::start("") }
+    pub(super) fn of_frame(&self, number: u32, all: &RangeInclusive<u32>) -> Self {
+        let (is_watched, written) = (self.is_watched, self.written.clone());
+        Self { frame: Some((number, all.clone())), is_watched, written, ..Self::start("") }
+    }
+
+    fn prefix(&self) -> String {
+        let frame = self.frame.as_ref();
+        frame.map_or_else(String::new, |(number, all)| {
+            format!("frame {number} up to {}: ", all.end())
+        })
+    }
+
+    /// Share of all frames, of which this one has so large a share behind it.
+    fn share(&self, of_frame: f64) -> f64 {
+        let Some((number, all)) = &self.frame else { return of_frame };
+        let [before, count] = [number - all.start(), all.end() - all.start() + 1].map(f64::from);
+        (before + of_frame) / count
     }
 
     /// Shows another message.
     pub(super) fn say(&self, message: impl Into<String>) {
-        self.bar.set_message(format!("{}{}", self.prefix, message.into()));
+        self.bar.set_message(self.prefix() + &message.into());
     }
 
     /// Shows where a session is, the samples of cached light beside it with the seconds they took, and the error, which
@@ -69,11 +94,15 @@ impl Progress {
             self.error.set(error);
             line(session, rule, error.map(|(_, error)| error), cached)
         };
+        let line_every = if self.is_watched { WATCHED_EVERY } else { LINE_EVERY };
         if !self.bar.is_hidden() {
-            self.say(line());
-        } else if self.written.get().elapsed() > LINE_EVERY {
+            self.say(line().0);
+        } else if self.written.get().elapsed() > line_every {
             self.written.set(Instant::now());
-            tell(format_args!("lightgrid: {}{}", self.prefix, line()));
+            let (line, share) = line();
+            let share = self.is_watched.then(|| format!("{:.1}% ", 100.0 * self.share(share)));
+            let share = share.unwrap_or_default();
+            tell(format_args!("lightgrid: {share}{}{line}", self.prefix()));
         }
     }
 
@@ -88,15 +117,16 @@ impl Progress {
     }
 }
 
+/// Where a session is in words, and the share of its work that is done.
 fn line(
     session: &Session<'_>,
     rule: &StopRule,
     error: Option<RelativeError>,
     cached: (u32, f64),
-) -> String {
+) -> (String, f64) {
     if session.phase() == Phase::Learning {
         let (done, total) = (session.figures().learning_paths, session.view().learning_paths);
-        return format!("learning {}%", 100 * done / total.max(1));
+        return (format!("learning {}%", 100 * done / total.max(1)), 0.0);
     }
     let samples = session.samples() + cached.0;
     let mut text = rule.samples.map_or_else(
@@ -108,10 +138,9 @@ fn line(
     }
     // A limit of noise has that shown.
     let noise = error.map_or(f64::INFINITY, |(error, _)| error);
-    if let Some(left) = seconds_left(session, rule, noise, cached) {
-        text += &format!(", {} left", in_words(left));
-    }
-    text
+    let Some(left) = seconds_left(session, rule, noise, cached) else { return (text, 0.0) };
+    let rendered = session.figures().render_seconds + cached.1;
+    (text + &format!(", {} left", in_words(left)), rendered / (rendered + left).max(1e-9))
 }
 
 /// Shortest estimate of what the rules leave: samples at the speed so far, the clock, and noise

@@ -58,6 +58,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     super::device::check(arguments.device)?;
     start_threads(arguments.threads)?;
     let interrupt = Interrupt::watch("stopping after this pass and writing the picture");
+    if arguments.watched {
+        interrupt.follow_input();
+    }
     let progress = Progress::start("loading the scene and the map");
     // Side by side: a large scene and a large map take seconds each.
     let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
@@ -105,7 +108,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         Job { world: &world, environment: &environment, phases, notices, uploaded, interrupt };
     match frames {
         None => {
-            job.render(arguments, camera, None, &Progress::start("learning")).and_then(Error::all)
+            let progress = Progress::of_picture(arguments.watched);
+            job.render(arguments, camera, None, &progress).and_then(Error::all)
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
@@ -314,7 +318,7 @@ impl Job<'_> {
         reel.iter().for_each(|reel| self.interrupt.has_frames_in(&reel.folder));
         let mut failures = Vec::new();
         let mut known = Known::default();
-        let mut progress = Progress::start("");
+        let mut progress = Progress::of_picture(arguments.watched);
         for number in frames.numbers.clone() {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
@@ -322,7 +326,7 @@ impl Job<'_> {
             of_frame.distributions = arguments.distributions.as_ref().map(name);
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
-            progress = progress.of_frame(number, *frames.numbers.end());
+            progress = progress.of_frame(number, &frames.numbers);
             let camera = frames.camera(number, camera);
             // What one frame cannot be written to may take the next.
             match self.render(&of_frame, camera, Some(&mut known), &progress) {

@@ -41,8 +41,10 @@ pub struct CameraPlace {
     pub eye: DVec3,
     /// Metres; not the same point.
     pub target: DVec3,
-    /// Full vertical field of view in radians.
-    pub fov_y_radians: f32,
+    /// Direction towards the top of the picture, of any length; `None` is that of [`Camera::look_at`].
+    pub up: Option<DVec3>,
+    /// Its lengths are those of the file.
+    pub projection: Projection,
 }
 
 /// Where the first picture is taken from.
@@ -57,7 +59,15 @@ pub enum StartView {
 impl CameraPlace {
     /// The camera there, in a scene that lies so in its file.
     pub fn camera(&self, frame: Frame) -> Camera {
-        Camera::look_at(frame.point(self.eye), frame.point(self.target), self.fov_y_radians)
+        let (eye, target) = (frame.point(self.eye), frame.point(self.target));
+        let up = self.up.map_or_else(|| Camera::usual_up(eye - target), |up| up.as_vec3());
+        let projection = match self.projection {
+            Projection::Orthographic { half_height } => {
+                Projection::Orthographic { half_height: frame.length(half_height) }
+            }
+            perspective => perspective,
+        };
+        Camera { projection, ..Camera::facing(eye, target, up, 1.0) }
     }
 }
 
@@ -77,11 +87,19 @@ impl Camera {
         Vec3::from(self.world_from_camera.translation - back * self.focus_distance)
     }
 
-    /// A pinhole camera at `eye` that looks at `target`.
+    /// A pinhole camera at `eye` that looks at `target`, its picture upright: +Y is up, +Z where it looks along Y.
     pub fn look_at(eye: Vec3, target: Vec3, fov_y_radians: f32) -> Self {
+        Self::facing(eye, target, Self::usual_up(eye - target), fov_y_radians)
+    }
+
+    /// Up, for a camera with this vector behind it.
+    fn usual_up(back: Vec3) -> Vec3 {
+        if back.normalize_or(Vec3::Z).y.abs() > 0.999 { Vec3::Z } else { Vec3::Y }
+    }
+
+    fn facing(eye: Vec3, target: Vec3, up: Vec3, fov_y_radians: f32) -> Self {
         let z = (eye - target).normalize_or(Vec3::Z);
-        let up = if z.y.abs() > 0.999 { Vec3::Z } else { Vec3::Y };
-        let x = up.cross(z).normalize();
+        let x = up.cross(z).normalize_or(z.any_orthonormal_vector());
         let rotation = glam::Mat3::from_cols(x, z.cross(x), z);
         Self {
             name: String::new(),

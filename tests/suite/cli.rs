@@ -1,8 +1,9 @@
 //! The binary as a person uses it: what it writes, says and refuses.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use lightgrid::image::{ExrPicture, Image, read_exr_metadata, read_picture, write_exr};
 use serde_json::Value;
@@ -151,6 +152,10 @@ fn materials_are_changed_by_name() {
         bench.json("red.json")["settings"]["materials"][0],
         "wall:color=#ff0000,roughness=0.4"
     );
+    let office = lightgrid::scene::builtin::build("office").expect("built in");
+    let number = office.materials.iter().position(|it| it.name == "wall").expect("it has walls");
+    run(&format!("-o numbered.exr --material {number}:color=#ff0000,roughness=0.4"));
+    assert_eq!(mean("numbered.exr"), mean("red.exr"));
     run("-o without.exr --material wall:hidden");
     let [without, ..] = mean("without.exr");
     assert!(without > 2.0 * r, "the sky comes in: {without} {r}");
@@ -339,7 +344,7 @@ fn a_filter_for_pictures_that_are_not_written_changes_nothing() {
 
 /// Red, green and blue of an 8-bit picture without alpha.
 fn read_rgb(path: &Path) -> Vec<u8> {
-    let file = std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let file = BufReader::new(fs::File::open(path).expect("written"));
     let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
     assert_eq!(reader.info().color_type, png::ColorType::Rgb);
     let mut bytes = vec![0; reader.output_buffer_size().expect("small")];
@@ -684,11 +689,32 @@ fn files_below(folder: &Path) -> Vec<std::path::PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] }).collect()
 }
 
+/// A program that starts a render hears how far it is, and ends it by closing its input.
+#[test]
+fn a_watched_render_says_how_far_it_is_and_ends_with_its_input() {
+    let bench = Bench::new();
+    let line = render_line("-o a.png --spp 100000000 --json a.json --watched");
+    let mut command = bench.command(&line);
+    let mut child =
+        command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut lines =
+        BufReader::new(child.stderr.take().expect("piped")).lines().map_while(Result::ok);
+    // By the second one there are samples.
+    for _ in 0..2 {
+        let line = lines.find(|line| line.contains("% rendering, ")).expect("it is said");
+        assert!(line.starts_with("lightgrid: 0.") && line.contains("/100000000 samples"), "{line}");
+    }
+    drop(child.stdin.take());
+    let rest: Vec<String> = lines.collect();
+    assert!(child.wait().expect("it ends").success(), "{rest:?}");
+    assert!(rest.iter().any(|line| line.starts_with("wrote a.png")), "{rest:?}");
+    assert!(bench.json("a.json")["samples_per_pixel"].as_u64().expect("a count") > 0);
+}
+
 #[cfg(unix)]
 mod signals {
     use std::io::Read as _;
     use std::os::unix::process::ExitStatusExt as _;
-    use std::process::Stdio;
     use std::time::Duration;
 
     use super::*;
@@ -776,7 +802,7 @@ mod signals {
         std::thread::sleep(Duration::from_secs(8));
         send(&child, "-INT");
         let mut says = Vec::new();
-        let mut stderr = std::io::BufReader::new(child.stderr.take().expect("piped"));
+        let mut stderr = BufReader::new(child.stderr.take().expect("piped"));
         for byte in stderr.by_ref().bytes() {
             says.push(byte.expect("readable"));
             if says.ends_with(b"stopping") {
@@ -819,7 +845,7 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
 
 /// Red, green, blue and alpha of an 8-bit picture.
 fn read_rgba(path: &Path) -> Vec<[u8; 4]> {
-    let file = std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let file = BufReader::new(fs::File::open(path).expect("written"));
     let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
     assert_eq!(reader.info().color_type, png::ColorType::Rgba);
     let mut bytes = vec![0; reader.output_buffer_size().expect("small")];
@@ -901,8 +927,8 @@ fn options_have_the_coordinates_of_the_file() {
 fn a_reader_who_has_seen_enough_is_no_reason_to_panic() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
         .args(["completions", "bash"])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
     drop(child.stdout.take());

@@ -262,13 +262,16 @@ fn frames_are_the_pictures_from_where_the_camera_is_then() {
     run("moving.gltf --frames 12 --fps 8 -o path.##.exr");
     run("scene.gltf --eye 0,0.4,2 --target 0,0.4,0 --turntable 8 --frames 0..2 -o turn.##.exr");
     run("scene.gltf --eye 2,0.4,0 --target 0,0.4,0 -o side.exr");
+    run(
+        "scene.gltf --eye 0,0.4,2 --target 0,0.4,1 --about 0,0.4,0 --turntable 8 --frames 2 -o about.##.exr",
+    );
     assert_eq!(
         bench.files().into_iter().filter(|name| name.starts_with("path")).collect::<Vec<_>>(),
         ["path.04.exr", "path.05.exr", "path.06.exr", "path.07.exr", "path.08.exr", "path.12.exr"]
     );
-    for (same, other) in [("path.08", "side"), ("path.12", "side"), ("turn.02", "side")] {
-        let found = difference(&format!("{same}.exr"), &format!("{other}.exr"));
-        assert!(found < 1e-3, "{same} is {other}: {found}");
+    for same in ["path.08", "path.12", "turn.02", "about.02"] {
+        let found = difference(&format!("{same}.exr"), "side.exr");
+        assert!(found < 1e-3, "{same} is the side: {found}");
     }
     assert!(difference("path.04.exr", "turn.01.exr") < 1e-3, "an eighth of a turn");
     assert!(difference("turn.00.exr", "side.exr") > 0.05);

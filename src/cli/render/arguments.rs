@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Parser as _;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::cli::camera::CameraArguments;
 use crate::cli::choices::SceneArguments;
@@ -172,6 +172,10 @@ pub(in crate::cli) struct RenderArguments {
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = values::whole::<u16>(0..=1024), value_name = "N", help_heading = "Run")]
     pub(super) threads: u16,
+    /// For programs that start this one: says twice a second how far it is, and ends early, as by Ctrl-C, when standard
+    /// input ends.
+    #[arg(long, help_heading = "Run")]
+    pub(super) watched: bool,
     /// Leaves times out of what pictures say about themselves: equal pictures are equal files.
     #[arg(long, help_heading = "Run")]
     pub(super) reproducible: bool,
@@ -198,10 +202,13 @@ pub(in crate::cli) struct RenderArguments {
     /// Outputs are out.####.png, or .mp4, .webm and .gif by ffmpeg. Frame N is at N / fps seconds.
     #[arg(long, value_parser = values::frames, value_name = "A..B", help_heading = "Frames")]
     pub(super) frames: Option<RangeInclusive<u32>>,
-    /// Turns the camera once in so many frames about the vertical through --target; without it, through
+    /// Turns the camera once in so many frames about the vertical through --about or --target; without them, through
     /// what the middle of the picture shows or, in a room, the camera itself.
     #[arg(long, value_parser = values::whole::<u32>(1..=100_000), value_name = "N", help_heading = "Frames")]
     pub(super) turntable: Option<u32>,
+    /// The place that --turntable turns the camera about.
+    #[arg(long, value_parser = values::vector, requires = "turntable", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Frames")]
+    pub(super) about: Option<DVec3>,
     /// Frames per second.
     #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]
     pub(super) fps: f64,
@@ -391,7 +398,7 @@ mod tests {
 
     use super::*;
 
-    #[derive(Parser)]
+    #[derive(Debug, Parser)]
     struct Line {
         #[command(flatten)]
         arguments: RenderArguments,

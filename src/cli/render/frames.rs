@@ -43,8 +43,9 @@ impl<'a> Frames<'a> {
         let (motion, all) = match (&arguments.frames, arguments.turntable) {
             (None, None) => return Ok(None),
             (_, Some(count)) => {
-                let target = arguments.place.target.map(|at| world.scene.frame.point(at));
-                let about = target.unwrap_or_else(|| centre(world, camera));
+                let about = arguments.about.or(arguments.place.target);
+                let about = about.map(|about| world.scene.frame.point(about));
+                let about = about.unwrap_or_else(|| centre(world, camera));
                 (Motion::Turn { about, count }, 0..=count - 1)
             }
             (Some(frames), None) => {
