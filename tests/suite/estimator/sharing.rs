@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::scenes::{black, blended, lambert, lamp, painted, pane, room, varnish};
 use super::{environment, mean, view};
-use crate::z_test::expect_same_pixels;
+use crate::z_test::{Mean, pixels, z_test};
 
 const SHARED: [Sharing; 2] = [Sharing::Small, Sharing::Large];
 
@@ -42,14 +42,36 @@ fn render(world: &World, environment: &Environment, view: View, samples: u32) ->
     session.film().clone()
 }
 
-/// Mean over seeds of the picture's mean, and its standard error: pixels that share vary together, so
-/// their own spread does not tell it.
-fn over_seeds(seeds: u32, picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
-    let means: Vec<f64> = (0..seeds).into_par_iter().map(picture).collect();
-    let count = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / count;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean, (variance / count).sqrt())
+/// Pictures of so many seeds.
+struct Pictures(Vec<Film>);
+
+impl Pictures {
+    fn of_seeds(seeds: u32, picture: impl Fn(u32) -> Film + Send + Sync) -> Self {
+        Self((0..seeds).into_par_iter().map(picture).collect())
+    }
+
+    /// Mean of the pictures' means, and its standard error: pixels that share vary together, so their own spread does
+    /// not tell it.
+    fn mean(&self) -> (f64, f64) {
+        let means: Vec<f64> = self.0.iter().map(|film| mean(film).luminance).collect();
+        let count = means.len() as f64;
+        let mean = means.iter().sum::<f64>() / count;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        (mean, (variance / count).sqrt())
+    }
+
+    /// Mean luminance of each pixel over the pictures, and the variance of that, which is at least as [`pixels`] has it.
+    fn pixels(&self) -> Vec<Mean> {
+        let count = self.0.len() as f64;
+        let of_films: Vec<Vec<Mean>> = self.0.iter().map(pixels).collect();
+        let pixel = |i: usize| {
+            let of_pixel = of_films.iter().map(|film| film[i]);
+            of_pixel.fold((0.0, 0.0), |(mean, variance), (of_mean, of_variance)| {
+                (mean + of_mean / count, variance + of_variance / count.powi(2))
+            })
+        };
+        (0..of_films[0].len()).map(pixel).collect()
+    }
 }
 
 /// A world, the map above it and where it is seen from.
@@ -58,19 +80,18 @@ type Place<'a> = (&'a World, &'a Environment, &'a Camera);
 /// Asserts that sharing changes no pixel's expectation, and none of the picture's mean, whose error over so
 /// many seeds is below `precision`.
 fn expect_unbiased(what: &str, (world, map, camera): Place<'_>, seeds: u32, precision: f64) {
-    let alone = picture(camera, Sampling::Plain, Sharing::Off, 1);
-    let means = |sharing, first: u32| {
-        over_seeds(seeds, |seed| {
-            let view = picture(camera, Sampling::Plain, sharing, first + seed);
-            mean(&render(world, map, view, 32)).luminance
+    let pictures = |sharing, first: u32| {
+        Pictures::of_seeds(seeds, |seed| {
+            render(world, map, picture(camera, Sampling::Plain, sharing, first + seed), 32)
         })
     };
-    let reference = render(world, map, alone, 512);
-    let (mean_alone, error_alone) = means(Sharing::Off, 1000);
+    let alone = pictures(Sharing::Off, 1000);
+    let (mean_alone, error_alone) = alone.mean();
     for (seed, sharing) in (2..).zip(SHARED) {
-        let film = render(world, map, picture(camera, Sampling::Plain, sharing, seed), 256);
-        expect_same_pixels(&format!("{what}, {sharing:?}"), &reference, &film, 1e-3);
-        let (mean, error) = means(sharing, 2000 * seed);
+        let shared = pictures(sharing, 2000 * seed);
+        let test = z_test(&alone.pixels(), &shared.pixels(), 1e-3);
+        assert!(test.passed(), "{what}, {sharing:?}: {test:?}");
+        let (mean, error) = shared.mean();
         let (off, noise) = (mean / mean_alone - 1.0, error.hypot(error_alone) / mean_alone);
         eprintln!("{what}, {sharing:?}: {:+.3} % +- {:.3}", 100.0 * off, 100.0 * noise);
         assert!(noise < precision, "{what}, {sharing:?}: {noise} is too noisy to tell");
@@ -210,7 +231,7 @@ fn polish_and_varnish_keep_what_sharing_gains() {
             let view = picture(&camera, Sampling::Adaptive, sharing, seed);
             render(&world, &overcast(), view, samples)
         };
-        let truth = film(Sharing::Off, 1, 2048).image();
+        let truth = film(Sharing::Off, 1, 1024).image();
         let error = |sharing| -> f64 {
             let of = |seed| {
                 let film: Film = film(sharing, seed, 32);
@@ -347,15 +368,16 @@ fn with_garbage_in_place_of_what_was_learned() {
         LightGrid::with_garbage_distributions(grid, map.tile_energies(), seed).expect("light")
     };
     let means = |sharing, first: u32, is_garbage: bool| {
-        over_seeds(48, |seed| {
+        let pictures = Pictures::of_seeds(48, |seed| {
             let view = picture(&camera, Sampling::Plain, sharing, first + seed);
             let mut session = Session::new(&world, &map, view);
             if is_garbage {
                 session.set_grid(garbage(first + seed)).expect("the CPU does not fail");
             }
             session.advance(32, &AtomicBool::new(false)).expect("the CPU does not fail");
-            mean(session.film()).luminance
-        })
+            session.film().clone()
+        });
+        pictures.mean()
     };
     let (alone, error_alone) = means(Sharing::Off, 1000, false);
     for (first, sharing) in (2..).map(|i| 1000 * i).zip(SHARED) {
