@@ -17,6 +17,7 @@ use super::loader::Loader;
 use super::messages::Messages;
 use super::panels::scope::Scope;
 use super::reload::Reload;
+use super::render_queue::RenderQueue;
 use super::rendering::Rendering;
 use super::save::Saves;
 use super::screen::Screen;
@@ -50,6 +51,8 @@ pub struct Start {
     pub pictures: Option<PathBuf>,
     /// Where small pictures of maps are kept.
     pub small_maps: Option<PathBuf>,
+    /// The program whose `render` renders into files.
+    pub program: PathBuf,
     /// For screenshots: no previews on the way, and no figures that depend on the clock.
     pub is_repeatable: bool,
 }
@@ -74,6 +77,8 @@ pub struct App {
     pub(super) tasks: Tasks,
     /// Where the picture is to be written once it has its full size.
     pub(super) saves: Saves,
+    /// What is rendered into files.
+    pub(super) renders: RenderQueue,
     /// The desktop's dialogues.
     pub(super) desktop: Desktop,
     /// See [`Start::is_repeatable`].
@@ -82,6 +87,8 @@ pub struct App {
     pub(super) toggles_full_screen: bool,
     /// Whether the window is to be closed.
     pub(super) is_closing: bool,
+    /// Whether it was said that renders would be ended early.
+    is_warned: bool,
 }
 
 impl App {
@@ -108,6 +115,7 @@ impl App {
         let read = small_maps.read(start.settings.recent_maps.clone());
         tasks.run("small maps", || Ok(TaskResult::SmallMaps(read())));
         let gpu = (start.adapter, start.rays);
+        let renders = RenderQueue::new(start.program, wakes.draw.clone());
         let is_watching = !start.is_repeatable;
         let reload = is_watching.then(|| Reload::start(wakes.draw.clone())).transpose()?;
         Ok(Self {
@@ -120,10 +128,12 @@ impl App {
             display: Display::start(screen, wakes.draw)?,
             tasks,
             saves: Saves::default(),
+            renders,
             desktop: Desktop::default(),
             is_repeatable: start.is_repeatable,
             toggles_full_screen: false,
             is_closing: false,
+            is_warned: false,
         })
     }
 
@@ -167,10 +177,22 @@ impl App {
             && self.display.is_settled()
     }
 
+    /// Whether the window may be closed: where files are being rendered it is asked for twice.
+    pub fn may_close(&mut self) -> bool {
+        let count = self.renders.unfinished();
+        if count == 0 || std::mem::replace(&mut self.is_warned, true) {
+            return true;
+        }
+        let files = if count == 1 { "1 file is" } else { &format!("{count} files are") };
+        self.messages.error(format!("{files} not rendered yet: close again to end that early"));
+        false
+    }
+
     /// Waits until all files are written; what has failed of that and was not yet told.
     pub fn finish(&mut self) -> Vec<String> {
         self.library.history.album = None;
         let mut failures = self.tasks.finish();
+        failures.extend(self.renders.finish());
         let why = "the window was closed before its picture was there";
         failures.extend(self.saves.give_up(why));
         failures
@@ -202,6 +224,7 @@ impl App {
             assets: &self.assets,
             rendering: &mut self.rendering,
             display: &mut self.display,
+            renders: &self.renders,
             is_repeatable: self.is_repeatable,
             commands,
         };
@@ -232,6 +255,7 @@ fn of_tab(ui: &mut egui::Ui, scope: &mut Scope<'_>) {
         Tab::Scene => panels::left::sections(ui, scope),
         Tab::Picture => {
             panels::picture::show(ui, scope);
+            panels::final_render::show(ui, scope);
             panels::history::show(ui, scope);
         }
         Tab::Inspect => {

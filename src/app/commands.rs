@@ -29,6 +29,12 @@ pub enum Command {
     Save(PathBuf),
     /// Put the picture on the clipboard.
     Copy,
+    /// Render the picture, or frames, into a file beside the window.
+    Render(PathBuf),
+    /// End the final render of this number in the list early, or take it from the list.
+    EndRender(usize),
+    /// Put the command that renders the same on the clipboard.
+    CopyCommandLine,
     /// Look from here.
     LookFrom(Viewpoint),
     /// Keep the present viewpoint.
@@ -99,7 +105,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 24] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 25] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -118,6 +124,7 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 24] = [
     (plain(Key::F11), "Full screen on or off", Command::ToggleFullScreen),
     (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),
     (control(Key::S), "Save the picture", Command::Ask(Purpose::Picture)),
+    (control(Key::R), "Render into a file", Command::Ask(Purpose::Render)),
     (control(Key::O), "Open a scene", Command::Ask(Purpose::Scene)),
     (control(Key::M), "Open a map", Command::Ask(Purpose::Map)),
     (plain(Key::F5), "Reload scene and map", Command::ReadAgain),

@@ -147,6 +147,7 @@ impl Purpose {
             Self::Scene => Command::OpenScene(path.to_owned()),
             Self::Map => Command::OpenMap(path.to_owned()),
             Self::Picture => Command::Save(path.into()),
+            Self::Render | Self::RenderFrames => Command::Render(path.into()),
             Self::Distributions => Command::Export(path.into()),
             Self::Reference => Command::OpenReference(path.to_owned()),
         }

@@ -10,6 +10,7 @@ use super::application::App;
 use super::assets::room_viewpoint;
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
+use super::final_render::{Motion, command_line};
 use super::interface::{Chosen, Purpose, Tab, Tool};
 use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
@@ -29,6 +30,9 @@ use crate::render::surface_map::look_at_place;
 use crate::scene::{LampEdits, builtin};
 use crate::sources;
 use crate::tone::display_rgb8;
+
+/// Why there is nothing to render.
+const NOT_YET: &str = "There is no picture yet";
 
 impl App {
     /// Carries out a command.
@@ -67,6 +71,20 @@ impl App {
             Command::ShowMethod => self.messages.failure(desktop::show_method()),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
+            Command::Render(path) => match self.render_words(&path) {
+                Some(words) => {
+                    self.library.note_save(&path);
+                    self.renders.add(path, words);
+                }
+                None => self.messages.notice(NOT_YET),
+            },
+            Command::EndRender(index) => self.renders.end(index),
+            Command::CopyCommandLine => {
+                let path = self.suggested_render();
+                let words = self.render_words(Path::new(&path));
+                let copied = words.map(|words| context.copy_text(command_line(&words)));
+                self.messages.notice(copied.map_or(NOT_YET, |()| "Copied the command"));
+            }
             Command::Copy => self.copy(context),
             Command::LookFrom(viewpoint) => document.viewpoint = Some(viewpoint),
             Command::Bookmark => self.library.bookmark(document),
@@ -144,7 +162,7 @@ impl App {
             }
             Command::ToggleZoom => interface.toggle_zoom(document.size),
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
-            Command::Quit => self.is_closing = true,
+            Command::Quit => self.is_closing = self.may_close(),
             Command::MakeSmallMap => {
                 if let Some(make) = self.library.small_maps.make_next() {
                     self.tasks.run("small map", || Ok(TaskResult::SmallMaps(make())));
@@ -176,7 +194,13 @@ impl App {
 
     /// Asks for a path: by a prompt, and by the system's dialogue before it where there is one.
     fn ask(&mut self, purpose: Purpose) {
+        let is_still = self.interface.final_render.motion == Motion::Still;
+        let purpose = match purpose {
+            Purpose::Render if !is_still => Purpose::RenderFrames,
+            purpose => purpose,
+        };
         let path = match purpose {
+            Purpose::Render | Purpose::RenderFrames => self.suggested_render(),
             Purpose::Picture => self.library.suggested_file(&self.edited.document.scene),
             Purpose::Distributions => "distributions.csv".to_owned(),
             _ => String::new(),
@@ -347,6 +371,24 @@ impl App {
             scene: self.assets.scene.clone()?,
             map: self.assets.map.clone()?,
         })
+    }
+
+    /// Where a final render is likely to be written.
+    fn suggested_render(&self) -> String {
+        let path = self.library.suggested_file(&self.edited.document.scene);
+        match self.interface.final_render.motion {
+            Motion::Still => path,
+            _ => Path::new(&path).with_extension("mp4").display().to_string(),
+        }
+    }
+
+    /// Arguments of this program that render what is shown into a file.
+    fn render_words(&self, path: &Path) -> Option<Vec<String>> {
+        let document = &self.edited.document;
+        let scene = &self.assets.scene_of(document)?.world.scene;
+        let of_scene = &self.library.history.of_scene;
+        let exposure_ev = self.display.exposure_ev(document)?;
+        Some(self.interface.final_render.words(document, scene, of_scene, exposure_ev, path))
     }
 
     fn export(&mut self, path: PathBuf) {

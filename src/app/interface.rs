@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::document::{PictureSize, in_other_shape};
 use super::drag::Drag;
+use super::final_render::FinalRender;
 use super::overlays::Overlay;
 use super::zoom::Zoom;
 use crate::scene::MaterialEdit;
@@ -55,6 +56,8 @@ with_defaults! {
         pub is_frozen: bool = false,
         /// What the next drag or click in the picture does, if it does not move the camera.
         pub tool: Option<Tool> = None,
+        /// Size and movement of what is rendered into files.
+        pub final_render: FinalRender = FinalRender::default(),
         /// The drag over the picture under way.
         pub drag: Option<Drag> = None,
         /// That of the wipe.
@@ -180,6 +183,10 @@ pub enum Purpose {
     Map,
     /// A picture to write.
     Picture,
+    /// A picture to be rendered into a file.
+    Render,
+    /// The same of frames.
+    RenderFrames,
     /// A file for the distributions.
     Distributions,
     /// A picture without noise.
@@ -195,6 +202,10 @@ impl Purpose {
             Self::Scene => ("Open a scene", "glTF scene", &["gltf", "glb"]),
             Self::Map => ("Open a map", "Map", MAPS),
             Self::Picture => ("Save the picture", "Picture", &["png", "exr"]),
+            Self::Render => ("Render into a file", "Picture", &["png", "exr"]),
+            Self::RenderFrames => {
+                ("Render frames into a file", "Frames", &["mp4", "webm", "gif", "png", "exr"])
+            }
             Self::Distributions => {
                 ("Export the distributions", "Distributions", &["csv", "json", "exr"])
             }
@@ -204,7 +215,7 @@ impl Purpose {
 
     /// Whether they are written.
     pub fn is_output(self) -> bool {
-        matches!(self, Self::Picture | Self::Distributions)
+        !matches!(self, Self::Scene | Self::Map | Self::Reference)
     }
 }
 

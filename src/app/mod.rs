@@ -3,7 +3,7 @@
 //! [`App`] holds a [`document::Document`] (what the picture is; `edited` undoes changes by comparing snapshots), an
 //! [`interface::Interface`] (what is open and pointed at) and, beside them, parts that know nothing of each other:
 //! `assets` (what is loaded), `rendering` (the worker), `display` (the presenter and the screen), `library` (what
-//! outlasts the window) and `tasks`. Every frame panels draw from them and change document and interface or ask for a
+//! outlasts the window), `renders` (files that other processes render) and `tasks`. Every frame panels draw from them and change document and interface or ask for a
 //! `commands::Command`; then the `worker` is told what to render and the `presenter` what to make ready on the device.
 //! Both take the latest value and publish the latest picture: nothing here waits. The viewport develops it on the
 //! device of the `screen` in the frame that draws it. `window` shows it on a display, [`screenshot`] in a texture
@@ -23,6 +23,7 @@ pub mod drag;
 mod dropped;
 mod edited;
 mod execute;
+pub mod final_render;
 pub(crate) mod history;
 mod input_order;
 mod inspect;
@@ -36,6 +37,7 @@ pub mod overlays;
 mod panels;
 pub(crate) mod presenter;
 mod reload;
+mod render_queue;
 mod rendering;
 mod save;
 pub(crate) mod screen;

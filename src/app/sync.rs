@@ -56,6 +56,11 @@ impl App {
         for kind in self.assets.changed(&self.edited.document, self.library.settings.reloads) {
             self.interface.paused &= !self.assets.read_again(kind, &self.edited.document);
         }
+        match self.renders.advance() {
+            Some(Ok(sentence)) => self.messages.notice(sentence),
+            Some(Err(sentence)) => self.messages.error(sentence),
+            None => {}
+        }
         self.take_render_failures();
         self.rendering.collect();
         if self.rendering.turns_out_dark() {

@@ -460,10 +460,11 @@ impl ApplicationHandler<Call> for Runner {
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(running) = &mut self.running else { return };
         match &event {
-            WindowEvent::CloseRequested => {
+            WindowEvent::CloseRequested if running.app.may_close() => {
                 self.close(event_loop);
                 return;
             }
+            WindowEvent::CloseRequested => running.canvas.window.request_redraw(),
             WindowEvent::RedrawRequested => {
                 let drawn = running.draw();
                 if std::mem::take(&mut running.app.library.has_news)

@@ -89,6 +89,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         pictures: Settings::pictures_folder(arguments.settings.as_deref()),
+        program: std::env::current_exe().unwrap_or_else(|_| "lightgrid".into()),
         small_maps: Settings::small_maps_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };

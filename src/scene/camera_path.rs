@@ -48,6 +48,11 @@ impl CameraPath {
         moves.then_some(Self { links })
     }
 
+    /// Time of the last key in seconds, above 0.
+    pub fn seconds(&self) -> f64 {
+        self.links.iter().map(Link::end).fold(0.0, f64::max)
+    }
+
     /// World from camera at a time in seconds; before the first key and after the last as there.
     pub fn at(&self, seconds: f64) -> DAffine3 {
         unmirrored(

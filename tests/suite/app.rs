@@ -8,6 +8,7 @@ use std::time::Duration;
 use glam::{Vec2, Vec3};
 use lightgrid::app::Start;
 use lightgrid::app::document::{Document, Light, Look, PictureSize};
+use lightgrid::app::final_render::{FinalRender, Motion};
 use lightgrid::app::interface::{Dock, Interface, Tab, TileView};
 use lightgrid::app::overlays::Overlay;
 use lightgrid::app::screenshot::Studio;
@@ -111,6 +112,15 @@ fn a_material_is_changed_and_hidden() {
     studio.arrange(panel);
     let without = studio.take().expect("drawn");
     compare("panel-material-hidden", &without).expect("as it was");
+}
+
+/// What is rendered into a file has a size of its own, and a camera that may turn.
+#[test]
+fn a_final_render_is_set_up() {
+    let Some(mut studio) = studio(start(), (1000, 1000)) else { return };
+    let final_render = FinalRender { motion: Motion::Orbit, ..FinalRender::default() };
+    studio.arrange(Interface { final_render, ..Interface::default() });
+    compare("panel-final-render", &studio.take().expect("drawn")).expect("as it was");
 }
 
 /// Where there is no room for two panels, the right one has what is in the left one elsewhere.

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use lightgrid::app::document::Viewpoint;
 use lightgrid::app::settings_file::{SceneViewpoints, Settings};
+use lightgrid::image::read_picture;
 use lightgrid::scene::builtin;
 use lightgrid::tone::auto_exposure_ev;
 
@@ -78,6 +79,43 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     desk.ends();
     let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
     assert!(settings.contains("window_size"), "{settings}");
+}
+
+/// A file that another process renders is of what the window shows; a window that is closed ends it early, and it is
+/// there all the same.
+#[test]
+fn files_are_rendered_beside_the_window() {
+    let Some(mut desk) = Desk::open() else { return };
+    let view = "view open --env sky:day@64x32 --size 96x64 --device cpu --settings window.json";
+    desk.start(&format!("{view} --samples 2"));
+    desk.save("window.exr");
+    desk.answer("ctrl+r", "final.exr");
+    let path = desk.path("final.exr");
+    let picture = desk.wait_for("file", || path.exists().then(|| read_picture(&path)));
+    let picture = picture.expect("a picture");
+    assert_eq!((picture.width, picture.height), (1920, 1080));
+    // What it looks at is named by another distance.
+    for key in ["scene", "eye", "fov_degrees", "samples_per_pixel"] {
+        let [window, file] = ["window.exr", "final.exr"].map(|name| desk.metadata(name, key));
+        assert_eq!(window, file, "{key}");
+    }
+    desk.xdotool("key ctrl+q");
+    desk.ends();
+
+    let path = desk.path("long.png");
+    let is_there = [5, 30, 120].map(Duration::from_secs).into_iter().any(|wait| {
+        desk.start(&format!("{view} --samples 1000000"));
+        desk.answer("ctrl+r", "long.png");
+        std::thread::sleep(wait);
+        desk.xdotool("key ctrl+q");
+        std::thread::sleep(Duration::from_secs(1));
+        let window = desk.window.as_mut().expect("started");
+        assert!(window.try_wait().expect("asked").is_none(), "it closes unasked");
+        desk.xdotool("key ctrl+q");
+        desk.ends();
+        path.exists()
+    });
+    assert!(is_there, "nothing is written: {}", desk.says());
 }
 
 #[test]

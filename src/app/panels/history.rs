@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use egui::{Id, Image, RichText, Sense, TextureOptions, Ui, Vec2};
 
+use super::button::button;
 use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::kept_picture::KeptPicture;
@@ -20,6 +21,9 @@ const MAX_NAME: usize = 80;
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let Scope { interface, library, commands, .. } = scope;
     let (chosen, history) = (&mut interface.compared, &mut library.history);
+    theme::section(ui, "COMPARE");
+    let hint = "Keeps it for comparison with other pictures and later renders (K)";
+    button(ui, ("Keep this picture", hint), commands, Command::KeepPicture);
     if chosen.left.is_some() {
         ui.horizontal(|ui| {
             let mut way = |is_difference, name, hint| {

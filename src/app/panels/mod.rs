@@ -4,6 +4,7 @@ mod button;
 mod color_bar;
 pub(super) mod convergence;
 pub(super) mod dock;
+pub(super) mod final_render;
 mod gestures;
 pub(super) mod history;
 pub(super) mod inspector;

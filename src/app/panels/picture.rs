@@ -32,9 +32,6 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     region(ui, document.region.is_some(), commands);
     theme::section(ui, "STOP AT");
     stop(ui, document);
-    theme::section(ui, "COMPARE");
-    let hint = "Keeps it for comparison with other pictures and later renders (K)";
-    button(ui, ("Keep this picture", hint), commands, Command::KeepPicture);
 }
 
 fn denoiser(ui: &mut Ui, document: &mut Document) {

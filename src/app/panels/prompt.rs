@@ -60,6 +60,10 @@ pub(in crate::app) fn show(
         Purpose::Scene => ("Path of a .gltf or .glb file", "Open"),
         Purpose::Map => ("Path of an .exr, .hdr or 8-bit picture", "Open"),
         Purpose::Picture => ("Path of a .png (as shown) or .exr (linear, all layers)", "Save"),
+        Purpose::Render => ("Path of a .png (developed) or .exr (linear, all layers)", "Render"),
+        Purpose::RenderFrames => {
+            ("Path of an .mp4, .webm or .gif, or of .png or .exr pictures to be numbered", "Render")
+        }
         Purpose::Reference => {
             ("Path of a linear .exr or .hdr picture of the same view without noise", "Open")
         }

@@ -7,6 +7,7 @@ use crate::app::document::Document;
 use crate::app::interface::Interface;
 use crate::app::library::Library;
 use crate::app::loader::LoadedScene;
+use crate::app::render_queue::RenderQueue;
 use crate::app::rendering::Rendering;
 
 /// The parts of the application that panels draw and change.
@@ -23,6 +24,8 @@ pub(in crate::app) struct Scope<'a> {
     pub(in crate::app) rendering: &'a mut Rendering,
     /// What is on the screen.
     pub(in crate::app) display: &'a mut Display,
+    /// What is rendered into files.
+    pub(in crate::app) renders: &'a RenderQueue,
     /// Figures that depend on the clock are left out, and those of what is pointed at.
     pub(in crate::app) is_repeatable: bool,
     /// What is to be carried out.

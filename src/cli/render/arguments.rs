@@ -397,6 +397,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
+    use crate::scene::Projection;
 
     #[derive(Debug, Parser)]
     struct Line {
@@ -421,5 +422,165 @@ mod tests {
             assert_eq!(sharing(&format!("--sharing {name} --denoise")), Some(asked));
         }
         assert_eq!(sharing("--sharing 5x5"), None);
+    }
+
+    #[cfg(feature = "window")]
+    mod of_window {
+        use glam::{Quat, Vec3};
+
+        use super::*;
+        use crate::app::document::{Document, Light, Look, Viewpoint};
+        use crate::app::final_render::{FinalRender, Motion};
+        use crate::denoise::Denoiser;
+        use crate::scene::{LampEdit, MaterialEdit, PunctualKind, PunctualLight, SceneOptions};
+        use crate::tone::{ToneCurve, WhiteBalance};
+
+        /// The office with two lamps, two materials of one name, and axes of its own.
+        fn world() -> World {
+            let mut scene = builtin::build("office").expect("a scene");
+            scene.frame.center = DVec3::new(1000.0, -20.0, 3.0);
+            scene.frame.scale = 4.0;
+            scene.materials[1].name = scene.materials[2].name.clone();
+            scene.lights = ["Key", "it's: fill"].map(lamp).into();
+            World::new(scene)
+        }
+
+        fn lamp(name: &str) -> PunctualLight {
+            PunctualLight {
+                name: name.to_owned(),
+                kind: PunctualKind::Point,
+                position: Vec3::Y,
+                direction: Vec3::NEG_Z,
+                intensity: Vec3::ONE,
+                range: f32::INFINITY,
+            }
+        }
+
+        fn document(world: &World) -> Document {
+            let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.5, 1.0, -2.0), 0.7);
+            let viewpoint = Viewpoint::of(&camera, 2.5);
+            let rolled = viewpoint.rotation() * Quat::from_rotation_z(0.4);
+            let fog = Medium {
+                scattering: Vec3::new(0.1, 0.2, 0.3),
+                absorption: Vec3::new(0.03, 0.02, 0.01),
+                anisotropy: -0.5,
+                bounds: Some([Vec3::splat(-3.0), Vec3::new(2.0, 1.5, 4.0)]),
+            };
+            let edit =
+                |roughness| MaterialEdit { roughness: Some(roughness), ..Default::default() };
+            let dim = LampEdit { factor: 0.25, ..LampEdit::default() };
+            Document {
+                scene: "office".to_owned(),
+                map: "sky:night".to_owned(),
+                rotation_degrees: 33.5,
+                intensity: 0.5,
+                sun: 2.0,
+                lamps: 0.5,
+                lamp_edits: [(world.scene.lights[1].name.clone(), dim)].into(),
+                background: Background::Blurred(0.25),
+                fog: Some(fog),
+                viewpoint: Some(Viewpoint {
+                    rotation: rolled.to_array(),
+                    lens_radius: 0.0625,
+                    focus_distance: 3.0,
+                    ..viewpoint
+                }),
+                light: Light {
+                    device: DeviceChoice::Cpu,
+                    sampling: Sampling::Talk,
+                    bounces: 5,
+                    seed: 7,
+                    split: false,
+                },
+                look: Look {
+                    curve: ToneCurve::Neutral,
+                    white_balance: WhiteBalance { kelvin: 4000.0, tint: -0.25 },
+                    denoiser: Denoiser::ATrous,
+                    ..Look::default()
+                },
+                region: Some([0.25, 0.5, 0.75, 1.0]),
+                stop: StopRule { samples: None, seconds: Some(2.5), noise: Some(0.04) },
+                materials: [(0, edit(0.25)), (2, edit(0.75))].into(),
+                ..Document::default()
+            }
+        }
+
+        fn arguments(
+            final_render: FinalRender,
+            document: &Document,
+            world: &World,
+            to: &str,
+        ) -> RenderArguments {
+            let options = SceneOptions { hide: vec!["a b".to_owned()], ..SceneOptions::default() };
+            let to = Path::new(to);
+            let words = final_render.words(document, &world.scene, &options, -1.5, to);
+            let line = Line::try_parse_from(&words).map_err(|error| format!("{words:?}: {error}"));
+            line.expect("words that are understood").arguments
+        }
+
+        #[test]
+        fn the_words_ask_for_what_the_window_shows() {
+            let world = world();
+            let document = document(&world);
+            let still = FinalRender { size: [320, 180], ..FinalRender::default() };
+            let asked = arguments(still, &document, &world, "a.png");
+            let camera = asked.camera(&world, &mut Notices::default()).expect("sound");
+            let shown = document.view(320, 180).expect("a viewpoint");
+            let [of_asked, of_shown] = [&camera, &shown.camera].map(|it| it.world_from_camera);
+            assert!(of_asked.abs_diff_eq(of_shown, 1e-4), "{of_asked:?} {of_shown:?}");
+            assert_eq!(camera.lens_radius, 0.0625);
+            assert!((camera.focus_distance - 3.0).abs() < 1e-5);
+            let view = asked.view(&world, shown.camera.clone());
+            let learning_paths = shown.learning_paths;
+            let round = |medium: Option<Medium>| format!("{:.4?}", medium);
+            assert_eq!(round(view.medium), round(shown.medium));
+            let background = shown.background;
+            assert!(View { learning_paths, background, medium: shown.medium, ..view } == shown);
+            assert!(
+                matches!(asked.background, Some(Background::Blurred(r)) if (r - 0.25).abs() < 1e-6)
+            );
+            let options = asked.environment_options();
+            assert!((options.rotation_radians - 33.5_f32.to_radians()).abs() < 1e-6);
+            assert_eq!((options.intensity, options.sun, asked.map()), (0.5, 2.0, "sky:night"));
+            assert_eq!(asked.stop_rule(), document.stop);
+            assert_eq!(asked.device, DeviceChoice::Cpu);
+            let picture = format!("{:?}", asked.picture);
+            for part in ["Stops(-1.5)", "Neutral", "ATrous", "kelvin: 4000.0, tint: -0.25"] {
+                assert!(picture.contains(part), "{part}: {picture}");
+            }
+            let SceneOptions { hide, .. } = asked.of_scene.options();
+            assert_eq!(hide, ["a b"]);
+            let wall = &world.scene.materials[0].name;
+            // Another material has the name of the second one.
+            let edits = [format!("{wall}:roughness=0.25"), "2:roughness=0.75".to_owned()];
+            assert_eq!(asked.of_scene.edits(), edits);
+            let lamps = ["Key:factor=0.5", "it's: fill:factor=0.125"];
+            assert_eq!(asked.of_scene.lamp_edits(), lamps);
+        }
+
+        #[test]
+        fn cameras_turn_as_the_window_says() {
+            let world = world();
+            let viewpoint = Viewpoint {
+                fov_y_degrees: None,
+                half_height: 2.0,
+                ..document(&world).viewpoint.expect("there is one")
+            };
+            let document = Document { viewpoint: Some(viewpoint), ..Document::default() };
+            let of = |motion, to| {
+                let render = FinalRender { motion, frames: 12, ..FinalRender::default() };
+                arguments(render, &document, &world, to)
+            };
+            let orbit = of(Motion::Orbit, "a.png");
+            assert_eq!((orbit.turntable, orbit.about), (Some(12), None));
+            assert!(orbit.outputs[0].ends_with("a.####.png"), "{:?}", orbit.outputs);
+            let camera = orbit.camera(&world, &mut Notices::default()).expect("sound");
+            assert_eq!(camera.projection, Projection::Orthographic { half_height: 2.0 });
+            let look = of(Motion::LookAround, "a.mp4");
+            assert_eq!((look.turntable, look.about), (Some(12), look.place.eye));
+            assert!(look.outputs[0].ends_with("a.mp4"), "{:?}", look.outputs);
+            let still = of(Motion::Still, "a.exr");
+            assert_eq!((still.turntable, still.about), (None, None));
+        }
     }
 }
