@@ -83,6 +83,9 @@ pub struct SurfaceParameters {
 /// Sets the parameters that a texture varies to what the value read makes of the material's factors.
 type Variation = fn(&mut SurfaceParameters, &Material, Vec4);
 
+/// Textures that a material has, and what they vary.
+type Variations = [(TextureRef, Variation)];
+
 /// The textures that vary parameters; base colour, which vertices have too, apart. A texture that is
 /// not there reads as ones.
 const VARIATIONS: [(Slot, Variation); 14] = [
@@ -260,13 +263,13 @@ impl<'a> SurfacePoint<'a> {
 
     fn new(
         corner: &Corner<'_>,
-        variations: &[(TextureRef, Variation)],
+        variations: &Variations,
         mut parameters: Cow<'a, SurfaceParameters>,
         ray_direction: Vec3,
     ) -> Self {
         let material = corner.material();
-        let [a, b, c] = corner.positions();
-        let position = corner.blend([a, b, c]);
+        let corners @ [a, b, c] = corner.positions();
+        let position = corner.blend(corners);
         let front_normal = (b - a).cross(c - a).try_normalize().unwrap_or(-ray_direction);
         let front_face = ray_direction.dot(front_normal) < 0.0;
         let geometric_normal = if front_face { front_normal } else { -front_normal };
@@ -277,28 +280,25 @@ impl<'a> SurfacePoint<'a> {
         let unmapped =
             smooth_normal.filter(|normal| normal.length_squared() > 1e-12).unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
-        let (texture, scale) = (material.texture(Slot::Normal), material.normal_scale);
-        let mut normal = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
+        let mapped = |slot, scale| {
+            facing.turned(corner.mapped(unmapped, material.texture(slot), scale), unmapped)
+        };
+        let mut normal = mapped(Slot::Normal, material.normal_scale);
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
         if parameters.metallic > 0.0 {
             normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
         }
         let shading_frame = Frame::from_z(normal.normalize());
         let is_opaque = parameters.transmission <= 0.0 && parameters.diffuse_transmission <= 0.0;
-        let lift = match normals {
-            Some(normals) if is_opaque && is_tilted(unmapped, geometric_normal) => {
-                corner.lift(position, [a, b, c], normals, unmapped, geometric_normal)
-            }
-            _ => 0.0,
-        };
+        let smooth = normals.filter(|_| is_opaque && is_tilted(unmapped, geometric_normal));
+        let lift =
+            smooth.map_or(0.0, |normals| corner.lift(corners, normals, unmapped, geometric_normal));
         if parameters.anisotropy > 0.0 {
             let local = shading_frame.local_from_world(corner.anisotropy_direction(unmapped));
             parameters.to_mut().anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
         }
         if parameters.clearcoat > 0.0 && material.has_normal_map() {
-            let (texture, scale) =
-                (material.texture(Slot::ClearcoatNormal), material.clearcoat_normal_scale);
-            let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
+            let coat = mapped(Slot::ClearcoatNormal, material.clearcoat_normal_scale);
             let local = shading_frame.local_from_world(facing.mirroring(coat));
             parameters.to_mut().clearcoat_normal = local;
         }
@@ -390,25 +390,29 @@ impl<'a> Corner<'a> {
     }
 
     /// World positions of the triangle's corners.
+    /// What the scene has for the corners; `None` where it has none for any vertex.
+    fn of_vertices<T: Copy>(&self, values: &[T]) -> Option<[T; 3]> {
+        (!values.is_empty()).then(|| self.vertices.map(|i| values[i]))
+    }
+
     fn positions(&self) -> [Vec3; 3] {
         let positions = self.vertices.map(|i| self.scene.positions[i]);
         self.placing.map_or(positions, |placing| positions.map(|p| placing.position(p)))
     }
 
-    /// Interpolated tangent, and the handedness of the first corner's; `None` where the scene has none.
-    fn tangent(&self) -> Option<(Vec3, f32)> {
-        if self.scene.tangents.is_empty() {
-            return None;
-        }
-        let tangents = self.vertices.map(|i| self.scene.tangents[i]);
+    /// Interpolated tangent, and the bitangent to a normal, of the first corner's handedness; `None` where the scene
+    /// has none.
+    fn tangents(&self, normal: Vec3) -> Option<[Vec3; 2]> {
+        let tangents = self.of_vertices(&self.scene.tangents)?;
         let tangents =
             self.placing.map_or(tangents, |placing| tangents.map(|t| placing.tangent(t)));
-        Some((self.blend(tangents).xyz(), tangents[0].w))
+        let tangent = self.blend(tangents).xyz();
+        Some([tangent, normal.cross(tangent) * tangents[0].w])
     }
 
     fn uv(&self, set: u8) -> Vec2 {
-        let uvs = &self.scene.uvs[usize::from(set)];
-        if uvs.is_empty() { Vec2::ZERO } else { self.blend(self.vertices.map(|i| uvs[i])) }
+        let uvs = self.of_vertices(&self.scene.uvs[usize::from(set)]);
+        uvs.map_or(Vec2::ZERO, |uvs| self.blend(uvs))
     }
 
     /// The texture's value here, ones without a texture.
@@ -419,34 +423,20 @@ impl<'a> Corner<'a> {
     fn base_color(&self) -> Vec4 {
         let material = self.material();
         let color = material.base_color * self.read(material.texture(Slot::BaseColor));
-        if self.scene.colors.is_empty() {
-            return color;
-        }
-        color * self.blend(self.vertices.map(|i| self.scene.colors[i]))
+        self.of_vertices(&self.scene.colors).map_or(color, |colors| color * self.blend(colors))
     }
 
     /// Normals of the corners, not of unit length; `None` where the triangle is flat.
     fn normals(&self) -> Option<[Vec3; 3]> {
-        if self.scene.normals.is_empty() {
-            return None;
-        }
-        let normals = self.vertices.map(|i| self.scene.normals[i]);
-        if normals.contains(&Vec3::ZERO) {
-            return None;
-        }
+        let normals = self.of_vertices(&self.scene.normals);
+        let normals = normals.filter(|normals| !normals.contains(&Vec3::ZERO))?;
         Some(self.placing.map_or(normals, |placing| normals.map(|n| placing.normal(n))))
     }
 
     /// Height of the smooth shape over the triangle: each corner's tangent plane lifts the point to itself where it
     /// is higher, and the three points are blended.
-    fn lift(
-        &self,
-        position: Vec3,
-        corners: [Vec3; 3],
-        normals: [Vec3; 3],
-        smooth: Vec3,
-        geometric: Vec3,
-    ) -> f32 {
+    fn lift(&self, corners: [Vec3; 3], normals: [Vec3; 3], smooth: Vec3, geometric: Vec3) -> f32 {
+        let position = self.blend(corners);
         let side = 1.0_f32.copysign(smooth.dot(geometric));
         self.blend([0, 1, 2].map(|i| {
             let normal = normals[i] * side;
@@ -459,17 +449,15 @@ impl<'a> Corner<'a> {
     /// tangent is normalised in between, as MikkTSpace demands; without tangents the map is ignored.
     fn mapped(&self, normal: Vec3, texture: Option<&TextureRef>, scale: f32) -> Vec3 {
         let Some(texture) = texture else { return normal };
-        let Some((tangent, handedness)) = self.tangent() else { return normal };
-        let bitangent = normal.cross(tangent) * handedness;
+        let Some([tangent, bitangent]) = self.tangents(normal) else { return normal };
         let map = self.read(Some(texture)).xyz() * 2.0 - 1.0;
         tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z
     }
 
     /// World direction in which reflections are wide, not of unit length; zero without tangents.
     fn anisotropy_direction(&self, normal: Vec3) -> Vec3 {
-        let Some((tangent, handedness)) = self.tangent() else { return Vec3::ZERO };
+        let Some([tangent, bitangent]) = self.tangents(normal) else { return Vec3::ZERO };
         let m = self.material();
-        let bitangent = normal.cross(tangent) * handedness;
         let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
         let direction = m.texture(Slot::Anisotropy).map_or(Vec2::X, read);
         let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);
@@ -477,11 +465,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Makes the parameters those of this point, if they differ from those that all points share.
-    fn vary(
-        &self,
-        variations: &[(TextureRef, Variation)],
-        parameters: &mut Cow<'_, SurfaceParameters>,
-    ) {
+    fn vary(&self, variations: &Variations, parameters: &mut Cow<'_, SurfaceParameters>) {
         let m = self.material();
         if m.texture(Slot::BaseColor).is_some() || !self.scene.colors.is_empty() {
             parameters.to_mut().set_base_color(m, self.base_color());
