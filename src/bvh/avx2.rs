@@ -9,7 +9,7 @@ use std::arch::x86_64::{
 use super::build::Tree;
 use super::lanes::Lanes;
 use super::traverse;
-use super::wide::WIDTH;
+use super::wide::{PerLane, WIDTH};
 use super::{Hit, Ray};
 
 /// Whether this machine may call the functions below.
@@ -42,12 +42,12 @@ impl Lanes for Avx2 {
         Self(unsafe { _mm256_set1_ps(value) })
     }
     #[inline(always)]
-    fn load(values: &[f32; WIDTH]) -> Self {
+    fn load(values: &PerLane) -> Self {
         // SAFETY: the machine has AVX2, see `Avx2`; the array holds eight f32.
         Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
     }
     #[inline(always)]
-    fn store(self) -> [f32; WIDTH] {
+    fn store(self) -> PerLane {
         let mut values = [0.0; WIDTH];
         // SAFETY: the machine has AVX2, see `Avx2`; the array holds eight f32.
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };

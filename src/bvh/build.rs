@@ -41,7 +41,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'
     let place = |instance: &Instance| {
         let mesh = instance.mesh as usize;
         let root = &roots[mesh];
-        Placed::new(instance, &shared.meshes[mesh], root.reference, &root.node)
+        Placed::new(instance, shared.meshes[mesh].start, root.reference, &root.node)
     };
     let placed: Vec<Placed> = shared.instances.par_iter().map(place).collect();
     let own = shared.own(triangles.len()) as u32;
@@ -217,7 +217,9 @@ impl<'a> Collapse<'a> {
     /// Emits a tree of least depth over `primitives`, in their order along the binary tree.
     fn balanced(&mut self, primitives: &[u32], depth: usize) -> ((Vec3, Vec3), Reference) {
         assert!(depth < MAX_DEPTH, "eight-way splits of a u32 count end within 12 levels");
-        let bounds = self.primitive_bounds(primitives);
+        let boxes = primitives.iter().map(|&primitive| self.items.aabb(primitive));
+        let all = boxes.reduce(|a, b| a.union(&b)).expect("some primitives");
+        let bounds = (all.min.into(), all.max.into());
         if let [one] = primitives
             && let Item::Instance(number) = self.items.get(*one)
         {
@@ -267,12 +269,6 @@ impl<'a> Collapse<'a> {
             }
         }
         primitives
-    }
-
-    fn primitive_bounds(&self, primitives: &[u32]) -> (Vec3, Vec3) {
-        let boxes = primitives.iter().map(|&primitive| self.items.aabb(primitive));
-        let all = boxes.reduce(|a, b| a.union(&b)).expect("some primitives");
-        (all.min.into(), all.max.into())
     }
 }
 

@@ -96,13 +96,8 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// `root` and `node` are those of the mesh's tree, `triangles` the mesh.
-    pub(super) fn new(
-        instance: &Instance,
-        triangles: &Range<u32>,
-        root: Reference,
-        node: &Node,
-    ) -> Self {
+    /// `root` and `node` are those of the mesh's tree, `start` is the mesh's first triangle.
+    pub(super) fn new(instance: &Instance, start: u32, root: Reference, node: &Node) -> Self {
         let map = instance.world_from_mesh;
         let exact =
             DAffine3 { matrix3: map.matrix3.as_dmat3(), translation: map.translation.as_dvec3() };
@@ -134,7 +129,7 @@ impl Placed {
             extent: extent.max_element() as f32,
             mirrors: m.determinant() < 0.0,
             mesh: instance.mesh,
-            shift: instance.first.wrapping_sub(triangles.start),
+            shift: instance.first.wrapping_sub(start),
             root,
             bounds: ((low - rounding).as_vec3(), (high + rounding).as_vec3()),
         }

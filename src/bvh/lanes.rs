@@ -1,12 +1,12 @@
 //! Eight numbers at a time, on every machine.
 
-use super::wide::WIDTH;
+use super::wide::{PerLane, WIDTH};
 
 /// Eight lanes of f32. Comparisons return one bit a lane and are false for NaN.
 pub(super) trait Lanes: Copy {
     fn splat(value: f32) -> Self;
-    fn load(values: &[f32; WIDTH]) -> Self;
-    fn store(self) -> [f32; WIDTH];
+    fn load(values: &PerLane) -> Self;
+    fn store(self) -> PerLane;
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
@@ -21,7 +21,7 @@ pub(super) trait Lanes: Copy {
 
 /// Lanes for every machine: loops that the compiler turns into whatever vectors it may use.
 #[derive(Clone, Copy)]
-pub(super) struct Portable([f32; WIDTH]);
+pub(super) struct Portable(PerLane);
 
 impl Portable {
     #[inline(always)]
@@ -53,11 +53,11 @@ impl Lanes for Portable {
         Self([value; WIDTH])
     }
     #[inline(always)]
-    fn load(values: &[f32; WIDTH]) -> Self {
+    fn load(values: &PerLane) -> Self {
         Self(*values)
     }
     #[inline(always)]
-    fn store(self) -> [f32; WIDTH] {
+    fn store(self) -> PerLane {
         self.0
     }
     #[inline(always)]

@@ -8,7 +8,7 @@ use super::build::Tree;
 use super::instance::Placed;
 use super::lanes::{Bits, Lanes};
 use super::triangle::{self, BlockHits, Shear};
-use super::wide::{Block, INSTANCE, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
+use super::wide::{Block, INSTANCE, LEAF, Node, PerLane, Reference, STACK_CAPACITY, WIDTH};
 use super::{Hit, Ray};
 
 /// A ray as the box test wants it.
@@ -17,6 +17,7 @@ use super::{Hit, Ray};
 /// the sheared vertices of the triangle test, amounts to less than `13 u (|origin| + extent)` in
 /// space with `u = 2^-24`; boxes are made larger by 16 u, so that they never lose a triangle
 /// (after Ize, *Robust BVH Ray Traversal*, JCGT 2(2), 2013, which pads each distance instead).
+#[derive(Default)]
 struct BoxRay {
     inverse: [f32; 3],
     near_offset: [f32; 3],
@@ -34,12 +35,7 @@ impl BoxRay {
         let least = longest * (0.5_f32).powi(60);
         let reach = ray.origin.abs().max_element() + extent;
         let pad = reach * (16.0 * 0.5_f32.powi(24)) + f32::MIN_POSITIVE;
-        let mut result = Self {
-            inverse: [0.0; 3],
-            near_offset: [0.0; 3],
-            far_offset: [0.0; 3],
-            near_plane: [0; 3],
-        };
+        let mut result = Self::default();
         for axis in 0..3 {
             let direction = ray.direction[axis];
             let inverse = 1.0 / direction.abs().max(least).copysign(direction);
@@ -54,7 +50,7 @@ impl BoxRay {
 
     /// Mask of the boxes that the ray crosses in `[t_min, t_max]` and where it enters each.
     #[inline(always)]
-    fn enter<L: Lanes>(&self, node: &Node, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]) {
+    fn enter<L: Lanes>(&self, node: &Node, t_min: f32, t_max: f32) -> (u32, PerLane) {
         let mut near = L::splat(t_min);
         let mut far = L::splat(t_max);
         for axis in 0..3 {
@@ -106,7 +102,7 @@ impl<const LEVELS: usize> Stack<LEVELS> {
     /// Pushes the children of `node` in the lanes of `mask`, which is not zero, far ones first, save
     /// for the nearest, which is returned.
     #[inline(always)]
-    fn descend(&mut self, node: &Node, mask: u32, near: &[f32; WIDTH]) -> Reference {
+    fn descend(&mut self, node: &Node, mask: u32, near: &PerLane) -> Reference {
         let base = self.length;
         let mut entries = Bits(mask).map(|lane| entry(near[lane], node.children[lane]));
         let mut nearest = entries.next().expect("the mask is not zero");
@@ -205,10 +201,8 @@ fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
             }
             let hits = triangle::intersect::<L>(block, &shear, t_min, t_max);
             if hits.mask != 0 {
-                match visit(block, &hits) {
-                    Some(limit) => t_max = limit,
-                    None => return,
-                }
+                let Some(limit) = visit(block, &hits) else { return };
+                t_max = limit;
             }
         } else {
             let node = &nodes[current as usize];

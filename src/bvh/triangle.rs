@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec2};
 
 use super::lanes::{Bits, Lanes};
-use super::wide::{Block, WIDTH};
+use super::wide::{Block, PerLane, WIDTH};
 use super::{Hit, Ray};
 
 /// A ray as the triangle test wants it: the frame in which it runs along the third axis.
@@ -40,8 +40,8 @@ impl Shear {
 pub(super) struct BlockHits {
     /// Bit `i` is set where triangle `i` is hit.
     pub(super) mask: u32,
-    t: [f32; WIDTH],
-    barycentric: [[f32; WIDTH]; 2],
+    t: PerLane,
+    barycentric: [PerLane; 2],
 }
 
 impl BlockHits {
@@ -124,7 +124,7 @@ fn magnitude<L: Lanes>(x: L) -> L {
 /// Puts the distances of the lanes in `lanes` to the triangles' planes, computed in f64.
 #[cold]
 #[inline(never)]
-fn exact_distances(t: &mut [f32; WIDTH], block: &Block, ray: &Shear, lanes: u32) {
+fn exact_distances(t: &mut PerLane, block: &Block, ray: &Shear, lanes: u32) {
     let of_axes = |values: &[f32; 3]| DVec3::from(values.map(f64::from));
     let (origin, direction) = (of_axes(&ray.origin), of_axes(&ray.direction));
     for lane in Bits(lanes) {
@@ -141,7 +141,7 @@ fn exact_distances(t: &mut [f32; WIDTH], block: &Block, ray: &Shear, lanes: u32)
 
 /// Vertices relative to the ray's origin, sheared so that the ray runs along the third axis.
 #[inline(always)]
-fn shear<L: Lanes>(vertices: &[[f32; WIDTH]; 3], ray: &Shear) -> [L; 3] {
+fn shear<L: Lanes>(vertices: &[PerLane; 3], ray: &Shear) -> [L; 3] {
     let [x, y, z] = ray.axes;
     debug_assert!(x < 3 && y < 3 && z < 3, "axes are a permutation of 0, 1, 2");
     // SAFETY: `Shear::new` makes `axes` of remainders of 3.
@@ -165,12 +165,7 @@ fn edge<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
 /// and returns a mask of the lanes that prove to be outside. Zero in f32 does not tell the side.
 #[cold]
 #[inline(never)]
-fn exact_edges(
-    edges: &mut [[f32; WIDTH]; 3],
-    px: &[[f32; WIDTH]; 3],
-    py: &[[f32; WIDTH]; 3],
-    lanes: u32,
-) -> u32 {
+fn exact_edges(edges: &mut [PerLane; 3], px: &[PerLane; 3], py: &[PerLane; 3], lanes: u32) -> u32 {
     let mut outside = 0;
     for lane in Bits(lanes) {
         let edge = |a: usize, b: usize| {

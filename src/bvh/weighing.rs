@@ -122,8 +122,7 @@ impl<'a> Weighing<'a> {
         let node = &self.binary.nodes[index as usize];
         let area = node.aabb().half_area();
         if self.items.instance_of(self.binary, index).is_some() {
-            let choices = Choices::OF_INSTANCE.0;
-            self.choices[index as usize].store(choices, Ordering::Relaxed);
+            self.choices[index as usize].store(Choices::OF_INSTANCE.0, Ordering::Relaxed);
             // Too many for a block.
             SubtreeCosts { forest: [area * INSTANCE_COST; WIDTH - 1], count: WIDTH as u32 + 1 }
         } else {

@@ -5,6 +5,9 @@ use glam::Vec3;
 /// Children of a node and triangles of a leaf block.
 pub(super) const WIDTH: usize = 8;
 
+/// A number for each lane.
+pub(super) type PerLane = [f32; WIDTH];
+
 /// Deepest chain of nodes from the root, checked while the tree is built.
 pub(super) const MAX_DEPTH: usize = 36;
 
@@ -26,7 +29,7 @@ pub(super) const INSTANCE: Reference = LEAF | 1 << 30;
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// Planes `2 * axis` hold the lower, `2 * axis + 1` the upper bounds.
-    pub(super) planes: [[f32; WIDTH]; 6],
+    pub(super) planes: [PerLane; 6],
     /// What each box holds.
     pub(super) children: [Reference; WIDTH],
 }
@@ -62,7 +65,7 @@ impl Node {
 #[repr(C, align(64))]
 pub(super) struct Block {
     /// Coordinates by vertex, axis and lane.
-    pub(super) vertices: [[[f32; WIDTH]; 3]; 3],
+    pub(super) vertices: [[PerLane; 3]; 3],
     /// Index of each triangle in the list the tree was built from.
     pub(super) triangles: [u32; WIDTH],
 }
