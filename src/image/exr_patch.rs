@@ -3,11 +3,14 @@
 
 use std::ops::Range;
 
+/// How many pixels a sample of a channel stands for, across and down.
+pub(super) type Step = [usize; 2];
+
 /// A file as the crate reads it.
 pub(super) struct Patched {
     pub(super) bytes: Vec<u8>,
-    /// How many pixels of the first part a sample of each channel stands for, across and down.
-    pub(super) sampling: Vec<[usize; 2]>,
+    /// Of each channel of the first part.
+    pub(super) sampling: Vec<Step>,
 }
 
 /// Sorts the channels, in whose order OpenEXR reads pixels, and makes all of them seem to have a sample a

@@ -13,12 +13,12 @@ use exr::meta::attribute::{
     AttributeValue, ChannelDescription, ChannelList, EnvironmentMap, IntegerBounds, SampleType,
 };
 use exr::meta::header::{Header, LayerAttributes};
-use exr::prelude::f16;
+use exr::prelude::{Text, f16};
 use glam::{DVec2, Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::exr_channels::{Channels, select};
-use super::exr_patch::patch;
+use super::exr_patch::{Step, patch};
 use super::file::{open_file, read_cause, read_file};
 use super::guard::guarded;
 use super::picture::FilePicture;
@@ -40,11 +40,11 @@ pub(crate) fn read_exr(path: &Path) -> Result<FilePicture> {
         || match ChunkReader::read_from_buffered(BufReader::with_capacity(1 << 20, file), false) {
             Ok(reader) => decode(reader, file_bytes, None),
             Err(failure) if is_patched(&failure) => {
-                let file = patch(read_file(path)?).ok_or_else(|| decode_cause(&failure))?;
+                let file = patch(read_file(path)?).ok_or_else(|| decode_cause(failure))?;
                 let reader = ChunkReader::read_from_buffered(Cursor::new(file.bytes), false);
-                decode(reader.map_err(|e| decode_cause(&e))?, file_bytes, Some(file.sampling))
+                decode(reader.map_err(decode_cause)?, file_bytes, Some(file.sampling))
             }
-            Err(failure) => Err(decode_cause(&failure)),
+            Err(failure) => Err(decode_cause(failure)),
         };
     guarded(decoded).at(path)
 }
@@ -66,14 +66,11 @@ fn is_patched(failure: &exr::error::Error) -> bool {
 /// If the file is missing or its header is damaged.
 pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let mut found: Vec<(String, String)> = own_attributes(path)?
-        .other
-        .iter()
-        .filter_map(|(name, value)| match value {
-            AttributeValue::Text(value) => Some((text(name.bytes()), text(value.bytes()))),
-            _ => None,
-        })
-        .collect();
+    let pair = |(name, value): (&Text, &AttributeValue)| match value {
+        AttributeValue::Text(value) => Some((text(name.bytes()), text(value.bytes()))),
+        _ => None,
+    };
+    let mut found: Vec<_> = own_attributes(path)?.other.iter().filter_map(pair).collect();
     found.sort();
     Ok(found)
 }
@@ -97,7 +94,7 @@ pub fn read_exr_preview(path: &Path) -> Result<Option<Rgb8>> {
 fn own_attributes(path: &Path) -> Result<LayerAttributes> {
     let (file, _) = open_file(path).at(path)?;
     let read = || MetaData::read_from_buffered(BufReader::new(file), false);
-    let meta = guarded(|| read().map_err(|e| decode_cause(&e))).at(path)?;
+    let meta = guarded(|| read().map_err(decode_cause)).at(path)?;
     let mut headers = meta.headers.into_iter();
     Ok(headers.next().ok_or_else(|| Error::at(path, "has no pictures"))?.own_attributes)
 }
@@ -106,13 +103,13 @@ fn own_attributes(path: &Path) -> Result<LayerAttributes> {
 fn decode<R: Read + Seek>(
     reader: ChunkReader<R>,
     file_bytes: u64,
-    sampling: Option<Vec<[usize; 2]>>,
+    sampling: Option<Vec<Step>>,
 ) -> Decoded<FilePicture> {
     check_plausible(reader.headers(), file_bytes)?;
     let mut notices = Notices::default();
     let selection = select(reader.headers(), &mut notices)?;
     let header = reader.headers()[selection.part].clone();
-    let is_subsampled = |all: &Vec<[usize; 2]>| all.iter().any(|step| *step != [1, 1]);
+    let is_subsampled = |all: &Vec<Step>| all.iter().any(|step| *step != [1, 1]);
     let sampling = sampling.filter(|all| selection.part == 0 && is_subsampled(all));
     let placement = Placement::of(&header, &mut notices)?;
     let chromaticities = header.shared_attributes.chromaticities;
@@ -135,12 +132,12 @@ fn decode<R: Read + Seek>(
         .filter_chunks(false, |_, tile, block| {
             block.layer == selection.part && tile.is_largest_resolution_level()
         })
-        .map_err(|e| decode_cause(&e))?;
+        .map_err(decode_cause)?;
     let meta = chunks.meta_data().clone();
     let batch_size = batch_size(&header);
     loop {
         let batch = chunks.by_ref().take(batch_size).collect::<exr::error::Result<Vec<_>>>();
-        let batch = batch.map_err(|e| decode_cause(&e))?.into_par_iter();
+        let batch = batch.map_err(decode_cause)?.into_par_iter();
         let decoded = batch.map(|chunk| block_decoder.decode(chunk, &meta));
         let blocks: Vec<Block> = decoded.collect::<Decoded<_>>()?;
         // Not before there is something to show: a small file may claim a large display window.
@@ -282,20 +279,17 @@ fn layout(header: &Header) -> Vec<(SampleType, usize)> {
 }
 
 /// Hands `count` samples of one channel (native byte order) to `put`, left to right.
-fn for_each(sample_type: SampleType, count: usize, bytes: &[u8], put: impl FnMut(usize, f32)) {
-    fn each<const N: usize>(
-        bytes: &[u8],
-        of: impl Fn([u8; N]) -> f32,
-        mut put: impl FnMut(usize, f32),
-    ) {
-        bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| put(i, of(*b)));
-    }
+fn for_each(sample_type: SampleType, count: usize, bytes: &[u8], put: impl FnMut((usize, f32))) {
     let bytes = &bytes[..sample_type.bytes_per_sample() * count];
     match sample_type {
         SampleType::F16 => each(bytes, |b| f16::from_ne_bytes(b).to_f32(), put),
         SampleType::F32 => each(bytes, f32::from_ne_bytes, put),
         SampleType::U32 => each(bytes, |b| u32::from_ne_bytes(b) as f32, put),
     }
+}
+
+fn each<const N: usize>(bytes: &[u8], of: impl Fn([u8; N]) -> f32, put: impl FnMut((usize, f32))) {
+    bytes.as_chunks().0.iter().map(|bytes| of(*bytes)).enumerate().for_each(put);
 }
 
 /// Turns compressed chunks into linear Rec.709 pixels.
@@ -305,7 +299,7 @@ struct BlockDecoder {
     layout: Vec<(SampleType, usize)>,
     bytes_per_pixel: usize,
     /// Set if channels have lower resolutions: pixels that a sample of each stands for.
-    sampling: Option<Vec<[usize; 2]>>,
+    sampling: Option<Vec<Step>>,
     /// Luminance of the file's own red, green and blue.
     weights: Vec3,
     to_rec709: Option<Mat3>,
@@ -317,15 +311,15 @@ impl BlockDecoder {
             if let Some(sampling) = &self.sampling {
                 return self.decode_subsampled(chunk, meta, sampling);
             }
-            let block = UncompressedBlock::decompress_chunk(chunk, meta, false)
-                .map_err(|e| decode_cause(&e))?;
+            let block =
+                UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(decode_cause)?;
             let Vec2(width, height) = block.index.pixel_size;
             let mut pixels = vec![[0.0; 3]; width * height];
             let rows = block.data.chunks_exact(width * self.bytes_per_pixel);
             for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
                 for (i, channel) in self.channels.indices().into_iter().enumerate() {
                     let (sample_type, before) = self.layout[channel];
-                    for_each(sample_type, width, &row[before * width..], |x, v| pixels[x][i] = v);
+                    for_each(sample_type, width, &row[before * width..], |(x, v)| pixels[x][i] = v);
                 }
             }
             let Vec2(x, y) = block.index.pixel_position;
@@ -340,20 +334,20 @@ impl BlockDecoder {
         &self,
         chunk: Chunk,
         meta: &MetaData,
-        sampling: &[[usize; 2]],
+        sampling: &[Step],
     ) -> Decoded<Block> {
         let damaged = || "is damaged: its channels of lower resolution make no sense".to_owned();
         let mut meta = meta.clone();
         let header = meta.headers.get_mut(chunk.layer_index).ok_or_else(damaged)?;
         let place = header.get_block_data_indices(&chunk.compressed_block);
         let place = place.and_then(|place| header.get_absolute_block_pixel_coordinates(place));
-        let place = place.map_err(|e| decode_cause(&e))?;
+        let place = place.map_err(decode_cause)?;
         let (Vec2(width, height), first) = (place.size, place.position.1);
-        let has_samples = |row: usize, [_, down]: [usize; 2]| {
+        let has_samples = |row: usize, [_, down]: Step| {
             (i64::from(first) + row as i64).rem_euclid(down.max(1) as i64) == 0
         };
         // Channels with their bytes in a line.
-        let lines: Vec<(usize, [usize; 2], usize)> = (0..)
+        let lines: Vec<(usize, Step, usize)> = (0..)
             .zip(sampling)
             .map(|(channel, &step)| {
                 let (sample_type, _) = self.layout[channel];
@@ -389,8 +383,7 @@ impl BlockDecoder {
             for (channel, step) in header.channels.list.iter_mut().zip(sampling) {
                 channel.sampling = Vec2(step[0], step[1]);
             }
-            let block = UncompressedBlock::decompress_chunk(chunk, &meta, false);
-            block.map_err(|e| decode_cause(&e))?.data
+            UncompressedBlock::decompress_chunk(chunk, &meta, false).map_err(decode_cause)?.data
         };
         let mut pixels = vec![[f32::NAN; 3]; width * height];
         let mut rest = data.as_slice();
@@ -398,7 +391,7 @@ impl BlockDecoder {
             for &(channel, step, bytes) in of_row(row) {
                 let samples = rest.split_off(..bytes).ok_or_else(damaged)?;
                 for i in (0..3).filter(|i| self.channels.indices().get(*i) == Some(&channel)) {
-                    for_each(self.layout[channel].0, width / step[0], samples, |x, v| {
+                    for_each(self.layout[channel].0, width / step[0], samples, |(x, v)| {
                         line[x * step[0]..][..step[0]].iter_mut().for_each(|pixel| pixel[i] = v);
                     });
                 }
@@ -448,8 +441,8 @@ impl BlockDecoder {
 fn planes_of_b44(
     chunk: Chunk,
     header: &Header,
-    lines: &[(usize, [usize; 2], usize)],
-    rows: impl Fn([usize; 2]) -> usize,
+    lines: &[(usize, Step, usize)],
+    rows: impl Fn(Step) -> usize,
 ) -> Option<Vec<Vec<u8>>> {
     let CompressedBlock::ScanLine(block) = chunk.compressed_block else { return None };
     let mut rest = block.compressed_pixels_le.as_slice();
@@ -487,10 +480,10 @@ fn rgb_from_ycc([y, ry, by]: [f32; 3], weights: Vec3) -> [f32; 3] {
 }
 
 /// A decoder's error in the words of someone who wanted a picture.
-fn decode_cause(error: &exr::error::Error) -> String {
+fn decode_cause(error: exr::error::Error) -> String {
     use exr::error::Error as Exr;
     match error {
-        Exr::Io(error) => read_cause(error),
+        Exr::Io(error) => read_cause(&error),
         Exr::Invalid(what)
             if what.contains("missing magic") || what.contains("file identifier") =>
         {

@@ -107,8 +107,7 @@ pub(crate) fn name_of_process() -> &'static str {
 pub fn check_writable(path: &Path) -> Result<()> {
     let target = checked_target(path)?;
     let temporary = Temporary::beside(&target);
-    temporary.create().map_err(|error| Error::at(path, write_cause(&error)))?;
-    Ok(())
+    temporary.create().map(drop).map_err(|error| Error::at(path, write_cause(&error)))
 }
 
 /// Makes a folder and those above it, if they are not there.

@@ -176,10 +176,7 @@ impl<'a> File<'a> {
             return Err(DAMAGED.into());
         }
         let color = slice(24).ok_or(DAMAGED)?;
-        let second = match self.channels.len() {
-            0 | 1 => None,
-            _ => Some(slice(32).ok_or(DAMAGED)?),
-        };
+        let second = (self.channels.len() > 1).then(|| slice(32).ok_or(DAMAGED)).transpose()?;
         let [width, height] = [self.width, self.height].map(|side| side as u32);
         let [columns, rows] = [width, height].map(|side| side.div_ceil(4));
         if self.is_doubtful {

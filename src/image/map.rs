@@ -193,11 +193,7 @@ fn read_developed(path: &Path) -> Result<FilePicture> {
     let decoded = guarded(|| decode_ldr_file(path)).at(path)?;
     let mut notices = Notices::default();
     let (width, height) = (decoded.width(), decoded.height());
-    let bits = match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {
-        1 => 8,
-        2 => 16,
-        _ => 32,
-    };
+    let bits = 8 * (decoded.color().bytes_per_pixel() / decoded.color().channel_count());
     let pixels = if bits == 8 {
         let linear: Vec<f32> = (0..256).map(|v| linear_from_srgb(v as f32 / 255.0)).collect();
         decoded.into_rgb8().pixels().map(|p| p.0.map(|v| linear[v as usize])).collect()
