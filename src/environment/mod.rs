@@ -244,8 +244,8 @@ impl Environment {
 
     /// The tile seen in a unit world direction.
     pub fn tile_of(&self, direction: Vec3) -> u32 {
-        let point = self.map_point(direction);
-        self.grid.tile_of_patch(point.column, point.row)
+        let (column, row) = self.patch_of(direction);
+        self.grid.tile_of_patch(column, row)
     }
 
     /// Per tile, the table's integral of importance over the tile's solid angle, at intensity 1. Tiles of energy
@@ -282,7 +282,7 @@ impl Environment {
         let across = sample_linear(left, right, patch.within.x);
         let point = MapPoint { column: patch.x, row: patch.y, across, down };
         let here = left + across * (right - left);
-        let pdf_solid_angle = self.density(tile, &point, here, || corners);
+        let pdf_solid_angle = self.density(tile, &point, here);
         if pdf_solid_angle <= 0.0 {
             return None;
         }
@@ -332,7 +332,7 @@ impl Environment {
         let corners = self.corners(point.column, point.row);
         let radiance = interpolated(corners, point.across, point.down);
         let here = importance(radiance * self.importance_scale);
-        let pdf = self.density(tile, &point, here, || self.importances(point.column, point.row));
+        let pdf = self.density(tile, &point, here);
         (self.scaled(radiance), tile, pdf)
     }
 
@@ -383,18 +383,12 @@ impl Environment {
 
     /// Density of [`Self::sample_in_tile`], given the tile, at a point of this scaled importance. Only
     /// summed-area tables need the importances at the patch's corners.
-    fn density(
-        &self,
-        tile: u32,
-        point: &MapPoint,
-        here: f32,
-        corners: impl Fn() -> Corners<f32>,
-    ) -> f32 {
+    fn density(&self, tile: u32, point: &MapPoint, here: f32) -> f32 {
         match &*self.table {
             Table::TileLocal(_) => here * self.inverse_energies[tile as usize],
             table @ Table::SummedArea(_) => {
                 let (x, y) = (point.column, point.row);
-                let energy = self.patch_energy(corners(), y);
+                let energy = self.patch_energy(self.importances(x, y), y);
                 let probability = table.sample_probability(&self.grid, tile, x, y) as f32;
                 if energy > 0.0 { probability * (here / energy) } else { 0.0 }
             }

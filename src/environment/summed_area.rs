@@ -179,26 +179,20 @@ fn search(range: &Range<u32>, u: f64, sum_to: impl Fn(u32) -> f64) -> Option<Cho
 /// Actual probability of [`search`] to end at each entry of these inclusive sums. Each comparison cuts the
 /// interval of `u` that leads to an entry, so this is exact even where the sums decrease.
 fn search_distribution(sums: &[f64]) -> Vec<f64> {
-    fn descend(
-        sums: &[f64],
-        first: usize,
-        last: usize,
-        [low, high]: [f64; 2],
-        distribution: &mut [f64],
-    ) {
+    fn descend(sums: &[f64], first: usize, last: usize, [low, high]: [f64; 2], out: &mut [f64]) {
         if high <= low {
             return;
         }
         if first == last {
             let before = if first == 0 { 0.0 } else { sums[first - 1] };
             if sums[first] > before {
-                distribution[first] = high - low;
+                out[first] = high - low;
             }
             return;
         }
         let middle = first + (last - first) / 2;
-        descend(sums, first, middle, [low, high.min(sums[middle])], distribution);
-        descend(sums, middle + 1, last, [low.max(sums[middle]), high], distribution);
+        descend(sums, first, middle, [low, high.min(sums[middle])], out);
+        descend(sums, middle + 1, last, [low.max(sums[middle]), high], out);
     }
     let mut distribution = vec![0.0; sums.len()];
     let total = sums[sums.len() - 1];

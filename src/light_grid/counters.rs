@@ -90,7 +90,7 @@ impl Counters {
     pub(crate) fn words(&self) -> (Vec<u32>, &[u32], Vec<u32>) {
         let visits = self.visits.iter().map(|word| word.load(Ordering::Relaxed)).collect();
         let pairs = self.blocks.iter().flat_map(|block| block.iter());
-        (visits, &self.slot_of_cell, pairs.flat_map(|p| parts(p.load(Ordering::Relaxed))).collect())
+        (visits, &self.slot_of_cell, pairs.flat_map(parts).collect())
     }
 
     /// Numbers of words of visits and of blocks in [`Self::words`].
@@ -143,12 +143,10 @@ impl Counters {
             visits.store(visits.load(Ordering::Relaxed).min(1 << 30), Ordering::Relaxed);
         }
         for block in &self.blocks {
-            let is_full = |word: &AtomicU64| {
-                parts(word.load(Ordering::Relaxed)).into_iter().any(|counter| counter >= 1 << 31)
-            };
+            let is_full = |word| parts(word).into_iter().any(|counter| counter >= 1 << 31);
             if block.iter().any(is_full) {
                 for word in block {
-                    let [tries, weight] = parts(word.load(Ordering::Relaxed));
+                    let [tries, weight] = parts(word);
                     word.store(pair(tries / 2, weight / 2), Ordering::Relaxed);
                 }
             }
@@ -168,7 +166,7 @@ impl Counters {
     /// Tries and weight sums (in units of a weight of 1) of a slot's tiles.
     pub fn tallies(&self, slot: usize) -> impl Iterator<Item = Tally> {
         self.blocks[slot].iter().map(|word| {
-            let [tries, weight] = parts(word.load(Ordering::Relaxed));
+            let [tries, weight] = parts(word);
             Tally { tries: tries.into(), weight: f64::from(weight) / f64::from(WEIGHT_ONE) }
         })
     }
@@ -189,7 +187,8 @@ fn pair(tries: u32, weight: u32) -> u64 {
 }
 
 /// Inverse of [`pair`].
-fn parts(word: u64) -> [u32; 2] {
+fn parts(word: &AtomicU64) -> [u32; 2] {
+    let word = word.load(Ordering::Relaxed);
     [word as u32, (word >> 32) as u32]
 }
 

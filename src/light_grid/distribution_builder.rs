@@ -166,13 +166,7 @@ impl<'a> DistributionBuilder<'a> {
 
     /// Energy of each tile times a power of its visibility ratio. Where the tile has few tries, its ratio is pooled
     /// with the block's, and that with the face's.
-    fn visible_energies(
-        &self,
-        slot: usize,
-        block: &[Tally],
-        face: &[Tally],
-        weights: &mut Vec<f64>,
-    ) {
+    fn visible_energies(&self, slot: usize, block: &[Tally], face: &[Tally], out: &mut Vec<f64>) {
         let k = self.options.pooling_tries;
         let shrink = |tally: &Tally, ratio: f64| {
             let tries = tally.tries + k;
@@ -180,7 +174,7 @@ impl<'a> DistributionBuilder<'a> {
         };
         let exponent = self.options.ratio_exponent;
         let own = self.counters.tallies(slot);
-        weights.extend(own.zip(block).zip(face).zip(&self.map_distribution).map(
+        out.extend(own.zip(block).zip(face).zip(&self.map_distribution).map(
             |(((own, block), face), map)| {
                 let ratio = shrink(&own, shrink(block, shrink(face, 0.0)));
                 // Most tiles of an interior are never seen: skip their power.

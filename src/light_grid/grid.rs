@@ -63,12 +63,9 @@ impl LightGrid {
             if by_whole_map { [WHOLE_MAP, distribution] } else { [distribution, WHOLE_MAP] };
         let choice = self.distributions.sample(own, bits, finer);
         let other = self.distributions.probability(other, choice.tile);
-        let probability = if by_whole_map {
-            mixed(choice.probability, other, whole_map_share)
-        } else {
-            mixed(other, choice.probability, whole_map_share)
-        };
-        TileChoice { probability, ..choice }
+        let (whole_map, learned) =
+            if by_whole_map { (choice.probability, other) } else { (other, choice.probability) };
+        TileChoice { probability: mixed(whole_map, learned, whole_map_share), ..choice }
     }
 
     /// Probability that [`Self::sample`] chooses `tile` at a point of distribution `distribution`.

@@ -30,12 +30,8 @@ impl LearningGrid {
     /// An empty grid over the tiles of a map.
     pub fn new(grid: SphericalGrid, tile_count: u32, options: DistributionOptions) -> Self {
         let budget = (MEMORY_BUDGET_BYTES as f64 * COUNTER_SHARE) as usize;
-        Self {
-            grid,
-            counters: Counters::new(grid.cell_count(), tile_count, budget),
-            options,
-            generation: 0,
-        }
+        let counters = Counters::new(grid.cell_count(), tile_count, budget);
+        Self { grid, counters, options, generation: 0 }
     }
 
     /// Whether both grids count the same kind of weight in grids of the same shape; centres may differ.

@@ -1,5 +1,7 @@
 //! Probability distributions over tiles, sparse and exact.
 
+use std::ops::Range;
+
 use crate::prefetch::prefetch_all;
 use crate::sampler::unit_from_bits;
 
@@ -67,7 +69,7 @@ impl TileDistributions {
 
     /// Number of tiles distribution `distribution` can choose.
     pub fn support(&self, distribution: u32) -> u32 {
-        self.starts[distribution as usize + 1] - self.starts[distribution as usize]
+        self.range(distribution).len() as u32
     }
 
     /// Bytes held.
@@ -147,16 +149,15 @@ impl TileDistributions {
 
     /// Prefetches the sums that [`Self::sample`] searches.
     pub(crate) fn prefetch(&self, distribution: u32) {
-        let (start, end) = self.range(distribution);
-        prefetch_all(&self.last[start..end]);
-        prefetch_all(&self.tiles[start..end]);
+        prefetch_all(&self.last[self.range(distribution)]);
+        prefetch_all(&self.tiles[self.range(distribution)]);
     }
 
     /// Chooses a tile of distribution `distribution` with a uniform 32-bit number. `finer` is the bits below
     /// it, without which there would be no remainder of a tile that has few units of `2^-32`.
     pub fn sample(&self, distribution: u32, bits: u32, finer: u32) -> TileChoice {
-        let (start, end) = self.range(distribution);
-        let last = &self.last[start..end];
+        let range = self.range(distribution);
+        let last = &self.last[range.clone()];
         let entry = last.partition_point(|&l| l < bits);
         let low = if entry == 0 { 0 } else { last[entry - 1] + 1 };
         let count = (last[entry] - low) as f32 + 1.0;
@@ -164,7 +165,7 @@ impl TileDistributions {
         // Rounding may carry the quotient to 1, which belongs to the next tile.
         let remainder = (place / count).min(1.0 - f32::EPSILON / 2.0);
         TileChoice {
-            tile: u32::from(self.tiles[start + entry]),
+            tile: u32::from(self.tiles[range.start + entry]),
             probability: count * (1.0 / 4_294_967_296.0),
             remainder: ((remainder * 16_777_216.0) as u32) << 8 | finer & 0xff,
         }
@@ -178,17 +179,14 @@ impl TileDistributions {
             return 0.0;
         }
         let rank = self.ranks[word] + (self.masks[word] & ((1 << bit) - 1)).count_ones() as u16;
-        let (start, _) = self.range(distribution);
-        let entry = start + rank as usize;
+        let entry = self.range(distribution).start + rank as usize;
         let low = if rank == 0 { 0 } else { self.last[entry - 1] + 1 };
         ((self.last[entry] - low) as f32 + 1.0) * (1.0 / 4_294_967_296.0)
     }
 
-    fn range(&self, distribution: u32) -> (usize, usize) {
-        (
-            self.starts[distribution as usize] as usize,
-            self.starts[distribution as usize + 1] as usize,
-        )
+    fn range(&self, distribution: u32) -> Range<usize> {
+        let at = distribution as usize;
+        self.starts[at] as usize..self.starts[at + 1] as usize
     }
 }
 
