@@ -10,6 +10,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::copies::{bits, copies, hash_of, mixed};
+use super::lists::appended;
 use super::{Material, Scene};
 
 /// Least cosine between normals of triangles in one plane.
@@ -54,8 +55,8 @@ impl Scene {
                     self.materials[number].backed = true;
                     return number as u32;
                 }
-                self.materials.push(Material { backed: true, ..self.materials[number].clone() });
-                self.materials.len() as u32 - 1
+                let backed = Material { backed: true, ..self.materials[number].clone() };
+                appended(&mut self.materials, backed)
             });
         }
     }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::copies::bits;
 use super::instances::Surface;
+use super::lists::{again, appended};
 use super::{Instance, Material, Scene};
 use crate::bvh::offset_origin;
 
@@ -283,14 +284,9 @@ impl Scene {
         again(&mut self.tangents, from);
         self.uvs.iter_mut().for_each(|uvs| again(uvs, from));
         again(&mut self.colors, from);
-        self.positions.push((self.positions[from].as_dvec3() + by).as_vec3());
-        self.positions.len() as u32 - 1
+        let position = (self.positions[from].as_dvec3() + by).as_vec3();
+        appended(&mut self.positions, position)
     }
-}
-
-/// Appends the value of a vertex, if vertices have values.
-pub(super) fn again<T: Copy>(values: &mut Vec<T>, vertex: usize) {
-    values.extend(values.get(vertex).copied());
 }
 
 /// How far [`offset_origin`] moves points along a normal, given how far they are from zero along each axis at most.

@@ -13,6 +13,7 @@ pub mod gltf;
 mod instances;
 mod lamp_edit;
 mod light;
+mod lists;
 mod material;
 mod material_edit;
 mod medium;

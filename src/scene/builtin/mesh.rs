@@ -2,6 +2,7 @@
 
 use glam::{Affine3A, EulerRot, Mat3, Quat, Vec2, Vec3, Vec4};
 
+use crate::scene::lists::appended;
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
 /// Height at which things stand above what carries them, so that no two faces are coplanar.
@@ -42,8 +43,7 @@ impl Builder {
 
     /// Adds a material.
     pub(super) fn material(&mut self, material: Material) -> Mat {
-        self.scene.materials.push(material);
-        self.scene.materials.len() as u32 - 1
+        appended(&mut self.scene.materials, material)
     }
 
     /// Adds a colour image that covers `size_metres` and repeats.

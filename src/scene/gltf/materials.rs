@@ -15,6 +15,7 @@ use super::limits::Fallible;
 use super::medium;
 use super::textures::{Decoded, Wanted};
 use crate::error::Notices;
+use crate::scene::lists::appended;
 use crate::scene::surface::absorption;
 use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot as Slot};
 
@@ -99,8 +100,7 @@ impl Materials {
             }
             sheet.diffuse_transmission_color *= tint;
             sheet.thickness = 0.0;
-            self.materials.push(sheet);
-            self.materials.len() as u32 - 1
+            appended(&mut self.materials, sheet)
         })
     }
 
@@ -167,14 +167,12 @@ impl<'a> Reader<'a> {
         let pbr = &source.pbr_metallic_roughness;
         self.material = Material {
             name: self.material.name.clone(),
-            base_color: Vec4::from_array(self.units(pbr.base_color_factor.0)),
+            base_color: self.units(pbr.base_color_factor.0).into(),
             metallic: self.unit(pbr.metallic_factor.0),
             roughness: self.unit(pbr.roughness_factor.0),
             normal_scale: self.finite(source.normal_texture.as_ref().map_or(1.0, |map| map.scale)),
             // Older files put lamps' strengths here.
-            emissive: Vec3::from_array(
-                source.emissive_factor.0.map(|x| self.within(x, 0.0, BRIGHTEST)),
-            ),
+            emissive: source.emissive_factor.0.map(|x| self.within(x, 0.0, BRIGHTEST)).into(),
             alpha_mode: match source.alpha_mode {
                 Checked::Valid(json::material::AlphaMode::Mask) => {
                     // Above 1 all is cut out, as what a person hides is by a cutoff of its own.
@@ -214,7 +212,7 @@ impl<'a> Reader<'a> {
             self.material.specular = self.unit(specular.specular_factor.0);
             self.texture(Slot::Specular, specular.specular_texture.as_ref())?;
             let tint = specular.specular_color_factor.0;
-            self.material.specular_color = Vec3::from_array(tint.map(|x| self.at_least(x, 0.0)));
+            self.material.specular_color = tint.map(|x| self.at_least(x, 0.0)).into();
             self.texture(Slot::SpecularColor, specular.specular_color_texture.as_ref())?;
         }
         if let Some(transmission) = &source.transmission {
@@ -223,8 +221,7 @@ impl<'a> Reader<'a> {
         }
         if let Some(volume) = &source.volume {
             self.material.thickness = self.at_least(volume.thickness_factor.0, 0.0);
-            self.material.attenuation_color =
-                Vec3::from_array(self.units(volume.attenuation_color.0));
+            self.material.attenuation_color = self.units(volume.attenuation_color.0).into();
             let distance = volume.attenuation_distance.0;
             // Zero is forbidden and means, in files that have it, that nobody set it.
             self.material.attenuation_distance =
@@ -264,10 +261,10 @@ impl<'a> Reader<'a> {
     /// an infinite index of refraction (`ior` 0) expresses exactly.
     fn specular_glossiness(&mut self, old: &Object) -> Fallible<()> {
         let diffuse: Option<[f32; 4]> = old.get("diffuseFactor").and_then(parsed);
-        self.material.base_color = Vec4::from_array(self.units(diffuse.unwrap_or([1.0; 4])));
+        self.material.base_color = self.units(diffuse.unwrap_or([1.0; 4])).into();
         self.texture(Slot::BaseColor, texture(old, "diffuseTexture"))?;
         let specular: Option<[f32; 3]> = old.get("specularFactor").and_then(parsed);
-        self.material.specular_color = Vec3::from_array(self.units(specular.unwrap_or([1.0; 3])));
+        self.material.specular_color = self.units(specular.unwrap_or([1.0; 3])).into();
         let glossiness = self.unit(number(old, "glossinessFactor", 1.0));
         for slot in [Slot::SpecularColor, Slot::MetallicRoughness] {
             self.texture(slot, texture(old, "specularGlossinessTexture"))?;
@@ -290,12 +287,9 @@ impl<'a> Reader<'a> {
             self.note(&format!("a texture on UV set {uv_set}, {left_out}"));
             return Ok(());
         }
-        let srgb = matches!(
-            slot,
-            BaseColor | DiffuseTransmissionColor | Emissive | SheenColor | SpecularColor
-        );
+        let colors = [BaseColor, DiffuseTransmissionColor, Emissive, SheenColor, SpecularColor];
         self.material.textures[slot as usize] = Some(Box::new(TextureRef {
-            texture: self.wanted.add(self.document, info.index, srgb)?,
+            texture: self.wanted.add(self.document, info.index, colors.contains(&slot))?,
             uv_set: uv_set as u8,
             transform: transform.map_or(Affine2::IDENTITY, uv_transform),
         }));

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::scene::flush::again;
+use crate::scene::lists::again;
 
 /// The triangles of one primitive with the vertices they use. Arrays of vertex data are empty
 /// where the primitive does not have it, else as long as `positions`.

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use super::part::Part;
 use super::share;
 use crate::memory;
+use crate::scene::lists::appended;
 
 /// Corners so near to each other are one, as a share of the largest coordinate: seams of closed meshes are
 /// rounded.
@@ -67,20 +68,17 @@ pub(super) fn sheets(parts: &[Part]) -> Result<Vec<bool>, String> {
     for triangle in triangles.iter().flatten() {
         *whole.entry(pieces.find(triangle[0])).or_default() += area(triangle);
     }
-    Ok(triangles
-        .iter()
-        .map(|triangles| {
-            let (mut all, mut sheet) = (0.0, 0.0);
-            for triangle in triangles {
-                let piece = pieces.find(triangle[0]);
-                let is_open =
-                    open.get(&piece).is_some_and(|open| *open > MIN_HOLES * whole[&piece]);
-                all += area(triangle);
-                sheet += if is_open { area(triangle) } else { 0.0 };
-            }
-            sheet > 0.5 * all
-        })
-        .collect())
+    let is_sheet = |triangles: &Vec<[u32; 3]>| {
+        let (mut all, mut sheet) = (0.0, 0.0);
+        for triangle in triangles {
+            let piece = pieces.find(triangle[0]);
+            let is_open = open.get(&piece).is_some_and(|open| *open > MIN_HOLES * whole[&piece]);
+            all += area(triangle);
+            sheet += if is_open { area(triangle) } else { 0.0 };
+        }
+        sheet > 0.5 * all
+    };
+    Ok(triangles.iter().map(is_sheet).collect())
 }
 
 /// Places of corners, and the triangles of each part between them, without those that have become flat.
@@ -88,20 +86,16 @@ fn welded(parts: &[Part]) -> (Vec<Vec3>, Vec<Vec<[u32; 3]>>) {
     let extent = share::extent(&parts.iter().collect::<Vec<_>>());
     let cell = (WELD * extent).max(f32::MIN_POSITIVE);
     let (mut corners, mut numbers) = (Vec::new(), HashMap::new());
-    let triangles = parts
-        .iter()
-        .map(|part| {
-            let mut number = |vertex: u32| {
-                let position = part.positions[vertex as usize];
-                *numbers.entry((position / cell).round().as_ivec3()).or_insert_with(|| {
-                    corners.push(position);
-                    corners.len() as u32 - 1
-                })
-            };
-            let welded = part.triangles.iter().map(|triangle| triangle.map(&mut number));
-            welded.filter(|[a, b, c]| a != b && b != c && c != a).collect()
-        })
-        .collect();
+    let weld = |part: &Part| {
+        let mut number = |vertex: u32| {
+            let position = part.positions[vertex as usize];
+            let place = (position / cell).round().as_ivec3();
+            *numbers.entry(place).or_insert_with(|| appended(&mut corners, position))
+        };
+        let welded = part.triangles.iter().map(|triangle| triangle.map(&mut number));
+        welded.filter(|[a, b, c]| a != b && b != c && c != a).collect()
+    };
+    let triangles = parts.iter().map(weld).collect();
     (corners, triangles)
 }
 

@@ -17,6 +17,7 @@ use super::uri::{self, Place};
 use crate::error::Notices;
 use crate::image::ldr::{LdrHeader, LdrImage, decode_ldr};
 use crate::memory;
+use crate::scene::lists::appended;
 use crate::scene::{Material, Texture, TextureImage, TextureSlot, Wrap};
 
 /// Most texels all images may have together: 4 GiB of 8 bits a channel.
@@ -71,10 +72,7 @@ impl Wanted {
             nearest: sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)),
             srgb,
         };
-        Ok(*self.places.entry(wanted).or_insert_with(|| {
-            self.textures.push(wanted);
-            self.textures.len() as u32 - 1
-        }))
+        Ok(*self.places.entry(wanted).or_insert_with(|| appended(&mut self.textures, wanted)))
     }
 
     /// Decodes the images in parallel. One that cannot be read is named in a notice.
@@ -118,8 +116,7 @@ impl Wanted {
         let mut textures = Vec::new();
         let place = |texture: &Texture| {
             let image = *read(&texture.image).or_else(|| read(other(&texture.image)?))?;
-            textures.push(Texture { image, ..*texture });
-            Some(textures.len() as u32 - 1)
+            Some(appended(&mut textures, Texture { image, ..*texture }))
         };
         let texture_map = self.textures.iter().map(place).collect();
         Decoded { textures, images, texture_map, rough: HashMap::new() }
@@ -150,10 +147,8 @@ impl Decoded {
         memory::check(image.texels.bytes().len() as u64).ok()?;
         let texels = image.texels.map_alpha(|alpha| 1.0 - factor * alpha)?;
         let rough = TextureImage { texels, ..*image };
-        let image = self.images.len() as u32;
-        self.images.push(rough);
-        self.textures.push(Texture { image, ..texture });
-        Some(self.textures.len() as u32 - 1)
+        let image = appended(&mut self.images, rough);
+        Some(appended(&mut self.textures, Texture { image, ..texture }))
     }
 }
 
@@ -192,8 +187,8 @@ impl Shelf {
             .into_iter()
             .map(|result| {
                 let LdrImage { width, height, pixels, is_premultiplied } = result?;
-                let place = self.images.len() as u32;
-                self.images.push(TextureImage { width, height, texels: pixels });
+                let image = TextureImage { width, height, texels: pixels };
+                let place = appended(&mut self.images, image);
                 if is_premultiplied {
                     self.premultiplied.push(place);
                 }
