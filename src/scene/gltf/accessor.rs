@@ -4,10 +4,13 @@ use std::borrow::Cow;
 
 use gltf::json;
 use json::accessor::{ComponentType, Type};
-use json::validation::{Checked, USize64};
+use json::validation::Checked;
 
 use super::buffers::File;
 use super::limits::Fallible;
+
+/// Which accessor of the file.
+pub(super) type AccessorIndex = json::Index<json::Accessor>;
 
 /// The elements of one accessor. All reads are in bounds once this is built, and nothing is
 /// allocated but the indices of sparse accessors.
@@ -37,11 +40,7 @@ struct Sparse<'a> {
 
 impl<'a> Elements<'a> {
     /// Checks an accessor against its buffers and the element types its user can read.
-    pub(super) fn open(
-        file: &'a File<'_>,
-        index: json::Index<json::Accessor>,
-        types: &[Type],
-    ) -> Fallible<Self> {
+    pub(super) fn open(file: &'a File<'_>, index: AccessorIndex, types: &[Type]) -> Fallible<Self> {
         let accessor = file.document.accessors.get(index)?;
         Self::of(file, &accessor, types).map_err(|cause| format!("accessor {index}: {cause}"))
     }
@@ -58,7 +57,8 @@ impl<'a> Elements<'a> {
         let count = usize::try_from(accessor.count.0).map_err(|_| "its count is too large")?;
         let (component, components) = (component.0, kind.multiplicity());
         let size = component.size() * components;
-        let open = |view| Strided::open(file, view, accessor.byte_offset, size, count);
+        let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+        let open = |view| Strided::open(file, view, offset, size, count);
         let base = accessor.buffer_view.map(open).transpose()?;
         // Zeros cost no bytes, so a count of them must be held against something that does.
         if base.is_none() && count > file.total_bytes() {
@@ -104,19 +104,10 @@ impl<'a> Elements<'a> {
     }
 
     #[inline]
-    fn read<T: Copy + Default, const N: usize>(
-        &self,
-        element: usize,
-        of: impl Fn(&[u8]) -> T,
-    ) -> [T; N] {
-        let mut values = [T::default(); N];
-        if let Some(bytes) = self.bytes(element) {
-            let size = self.component.size();
-            for (value, bytes) in values.iter_mut().take(self.components).zip(bytes.chunks(size)) {
-                *value = of(bytes);
-            }
-        }
-        values
+    fn read<T: Default, const N: usize>(&self, element: usize, of: impl Fn(&[u8]) -> T) -> [T; N] {
+        let bytes = self.bytes(element).unwrap_or_default();
+        let mut values = bytes.chunks(self.component.size()).map(of);
+        std::array::from_fn(|_| values.next().unwrap_or_default())
     }
 
     fn bytes(&self, element: usize) -> Option<&[u8]> {
@@ -160,13 +151,12 @@ impl<'a> Strided<'a> {
     fn open(
         file: &'a File<'_>,
         view: json::Index<json::buffer::View>,
-        offset: Option<USize64>,
+        offset: u64,
         size: usize,
         count: usize,
     ) -> Fallible<Self> {
         let (bytes, stride) = file.view(view)?;
         let stride = stride.unwrap_or(size);
-        let offset = offset.map_or(0, |offset| offset.0);
         let needed = count
             .checked_sub(1)
             .map_or(Some(0), |gaps| gaps.checked_mul(stride)?.checked_add(size));
@@ -201,10 +191,9 @@ impl<'a> Sparse<'a> {
         };
         let width = component.0.size();
         let (indices, values) = (&sparse.indices, &sparse.values);
-        let offset = Some(indices.byte_offset);
+        let offset = indices.byte_offset.0;
         let indices = Strided::open(file, indices.buffer_view, offset, width, rows)?;
-        let offset = Some(values.byte_offset);
-        let values = Strided::open(file, values.buffer_view, offset, size, rows)?;
+        let values = Strided::open(file, values.buffer_view, values.byte_offset.0, size, rows)?;
         let mut elements = Vec::with_capacity(rows);
         for row in 0..rows {
             let element = integer(indices.row(row, width));

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use gltf::json::buffer::View;
 use gltf::json::validation::USize64;
 use gltf::json::{self, Index};
 use serde::Deserialize;
@@ -163,10 +164,7 @@ impl<'a> File<'a> {
     }
 
     /// The bytes of a buffer view and its stride, if it gives one.
-    pub(super) fn view(
-        &self,
-        index: Index<json::buffer::View>,
-    ) -> Fallible<(&[u8], Option<usize>)> {
+    pub(super) fn view(&self, index: Index<View>) -> Fallible<(&[u8], Option<usize>)> {
         let views = &self.document.buffer_views;
         let view = views.get(index)?;
         let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);

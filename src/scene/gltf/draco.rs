@@ -7,7 +7,7 @@ use draco_core::{
 };
 use gltf::json;
 use json::accessor::{ComponentType, Type};
-use json::mesh::Mode;
+use json::mesh::{Mode, Primitive};
 use json::validation::Checked;
 use serde::Deserialize;
 
@@ -42,16 +42,10 @@ pub(super) struct Unpacked {
 
 impl Unpacked {
     /// Unpacks a primitive; `None` if it is a plain one.
-    pub(super) fn open(
-        file: &File<'_>,
-        primitive: &json::mesh::Primitive,
-    ) -> Fallible<Option<Self>> {
-        let extensions = primitive.extensions.as_ref();
-        let Some(extension) =
-            extensions.and_then(|all| all.others.get("KHR_draco_mesh_compression"))
-        else {
-            return Ok(None);
-        };
+    pub(super) fn open(file: &File<'_>, primitive: &Primitive) -> Fallible<Option<Self>> {
+        let extension = primitive.extensions.as_ref();
+        let extension = extension.and_then(|all| all.others.get("KHR_draco_mesh_compression"));
+        let Some(extension) = extension else { return Ok(None) };
         let Packed { buffer_view, attributes } = Packed::deserialize(extension)
             .map_err(|cause| format!("its Draco compression makes no sense ({cause})"))?;
         let limits = limits(file, primitive)?;
@@ -118,7 +112,7 @@ impl Unpacked {
 }
 
 /// No more is unpacked than the accessors promise, and memory has room for.
-fn limits(file: &File<'_>, primitive: &json::mesh::Primitive) -> Fallible<DecodeLimits> {
+fn limits(file: &File<'_>, primitive: &Primitive) -> Fallible<DecodeLimits> {
     let accessor = |index| file.document.accessors.get(index);
     let positions = Checked::Valid(json::mesh::Semantic::Positions);
     let positions = primitive.attributes.get(&positions).copied().map(accessor).transpose()?;

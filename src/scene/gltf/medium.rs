@@ -61,10 +61,8 @@ pub(super) fn inside(extras: &json::Extras, name: &str, notices: &mut Notices) -
 fn fog(extras: &json::Extras) -> Option<Map<String, Value>> {
     let text = extras.as_ref()?.get();
     let Value::Object(mut keys) = serde_json::from_str(text).ok()? else { return None };
-    match keys.remove("fog") {
-        Some(Value::Object(keys)) => Some(keys),
-        _ => None,
-    }
+    let Value::Object(fog) = keys.remove("fog")? else { return None };
+    Some(fog)
 }
 
 fn read(keys: &Map<String, Value>, place: &str, notices: &mut Notices) -> Option<Medium> {
@@ -81,12 +79,12 @@ fn understood(keys: &Map<String, Value>) -> Option<Medium> {
         Some(Value::Number(number)) => Some(Vec3::splat(number.as_f64()? as f32)),
         Some(value) => vector(value),
     };
-    let bounds = match keys.get("box") {
+    let bounds = match keys.get("box").map(Value::as_array) {
         None => None,
-        Some(value) => match value.as_array()?.as_slice() {
-            [low, high] => Some([vector(low)?, vector(high)?]),
-            _ => return None,
-        },
+        Some(corners) => {
+            let [low, high] = corners?.as_slice() else { return None };
+            Some([vector(low)?, vector(high)?])
+        }
     };
     let medium = Medium {
         scattering: coefficient("scattering")?,

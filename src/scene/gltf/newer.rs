@@ -29,10 +29,8 @@ impl Reader<'_> {
         self.texture(Slot::DiffuseTransmission, texture(from, "diffuseTransmissionTexture"))?;
         self.material.diffuse_transmission_color =
             self.unit_color(from, "diffuseTransmissionColorFactor", Vec3::ONE);
-        self.texture(
-            Slot::DiffuseTransmissionColor,
-            texture(from, "diffuseTransmissionColorTexture"),
-        )
+        let color = texture(from, "diffuseTransmissionColorTexture");
+        self.texture(Slot::DiffuseTransmissionColor, color)
     }
 
     /// `KHR_materials_iridescence`.

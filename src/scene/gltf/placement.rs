@@ -26,12 +26,12 @@ pub(super) struct Placement {
     pub(super) instances: Vec<DAffine3>,
 }
 
+/// By the number of the mesh.
+pub(super) type Placements = BTreeMap<u32, Vec<Placement>>;
+
 /// The shown nodes with meshes, by mesh, so that each mesh is read once.
-pub(super) fn placements(
-    file: &File<'_>,
-    nodes: &Nodes,
-) -> Fallible<BTreeMap<u32, Vec<Placement>>> {
-    let mut placements: BTreeMap<u32, Vec<Placement>> = BTreeMap::new();
+pub(super) fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<Placements> {
+    let mut placements = Placements::new();
     let mut shown = 0;
     for number in nodes.showing(MESH) {
         let node = file.document.nodes.get(number)?;
@@ -50,13 +50,9 @@ pub(super) fn placements(
 }
 
 /// [`box_around`] all that is shown, by what the file says of its positions.
-pub(super) fn bounds(
-    file: &File<'_>,
-    nodes: &Nodes,
-    placements: &BTreeMap<u32, Vec<Placement>>,
-) -> Fallible<[DVec3; 2]> {
+pub(super) fn bounds(file: &File<'_>, nodes: &Nodes, all: &Placements) -> Fallible<[DVec3; 2]> {
     let mut corners = Vec::new();
-    for (&number, placements) in placements {
+    for (&number, placements) in all {
         let mesh: Mesh = file.document.meshes.get_as(json::Index::new(number))?;
         let boxes: Vec<[DVec3; 2]> =
             mesh.primitives().filter_map(|primitive| own_box(file, &primitive.ok()?)).collect();
@@ -119,7 +115,7 @@ pub(super) fn box_around(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
 }
 
 /// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.
-pub(super) fn drop_copies(placements: &mut BTreeMap<u32, Vec<Placement>>) -> usize {
+pub(super) fn drop_copies(placements: &mut Placements) -> usize {
     let mut dropped = 0;
     for placements in placements.values_mut() {
         let numbers = |(number, placement): (usize, &Placement)| {

@@ -205,12 +205,9 @@ fn places(
     for top in hierarchy.tops() {
         hierarchy.walk(top, |number, depth| {
             visited += 1;
-            let node = match document.nodes.get(Index::new(number as u32)) {
-                Ok(node) => node,
-                Err(cause) => {
-                    failure.get_or_insert(cause);
-                    return false;
-                }
+            let node = document.nodes.get(Index::new(number as u32));
+            let Ok(node) = node.map_err(|cause| _ = failure.get_or_insert(cause)) else {
+                return false;
             };
             above.truncate(depth);
             let local = local_transform(&node);
@@ -237,7 +234,7 @@ fn places(
 /// What there is at a node.
 fn shows(node: &json::Node) -> u8 {
     let lights = node.extensions.as_ref().and_then(|all| all.khr_lights_punctual.as_ref());
-    let bit = |kind: u8, is_there: bool| if is_there { kind } else { 0 };
+    let bit = |kind: u8, is_there: bool| kind * u8::from(is_there);
     bit(MESH, node.mesh.is_some())
         | bit(CAMERA, node.camera.is_some())
         | bit(LIGHT, lights.is_some())
@@ -316,13 +313,10 @@ pub(super) fn joint_transforms(
     let joints = &skin.joints;
     let open = |accessor| Elements::open(file, accessor, &[Type::Mat4]);
     let inverse_bind = skin.inverse_bind_matrices.map(open).transpose()?;
-    if let Some(matrices) = &inverse_bind
-        && matrices.count < joints.len()
-    {
+    let (needed, count) = (joints.len(), inverse_bind.as_ref().map_or(joints.len(), |it| it.count));
+    if count < needed {
         return Err(format!(
-            "skin {index} has {} joints but only {} inverse bind matrices",
-            joints.len(),
-            matrices.count
+            "skin {index} has {needed} joints but only {count} inverse bind matrices"
         ));
     }
     let transform = |(joint, &node): (usize, &Index<json::Node>)| {

@@ -10,7 +10,7 @@ use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::accessor::Elements;
+use super::accessor::{AccessorIndex, Elements};
 use super::buffers::File;
 use super::draco::Unpacked;
 use super::limits::{Fallible, MAX_TRIANGLES, check_count};
@@ -52,15 +52,15 @@ struct Targets {
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) struct Target {
-    position: Option<json::Index<json::Accessor>>,
-    normal: Option<json::Index<json::Accessor>>,
-    tangent: Option<json::Index<json::Accessor>>,
-    texcoord_0: Option<json::Index<json::Accessor>>,
-    texcoord_1: Option<json::Index<json::Accessor>>,
-    color_0: Option<json::Index<json::Accessor>>,
+    position: Option<AccessorIndex>,
+    normal: Option<AccessorIndex>,
+    tangent: Option<AccessorIndex>,
+    texcoord_0: Option<AccessorIndex>,
+    texcoord_1: Option<AccessorIndex>,
+    color_0: Option<AccessorIndex>,
 }
 
-type Found<'a> = (json::Index<json::Accessor>, Elements<'a>);
+type Found<'a> = (AccessorIndex, Elements<'a>);
 
 /// A triangle primitive whose accessors are checked as they are read.
 pub(super) struct Source<'a> {
@@ -92,10 +92,10 @@ impl<'a> Source<'a> {
             Mode::Points => tally.points += 1,
             Mode::Lines | Mode::LineLoop | Mode::LineStrip => tally.lines += 1,
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {
-                let positions = Checked::Valid(Semantic::Positions);
-                if let Some(&accessor) = primitive.attributes.get(&positions) {
+                let semantic = Semantic::Positions;
+                if let Some(&accessor) = primitive.attributes.get(&Checked::Valid(semantic.clone()))
+                {
                     let draco = Unpacked::open(file, primitive)?;
-                    let semantic = Semantic::Positions;
                     let positions = open(file, draco.as_ref(), &semantic, accessor, &[Type::Vec3])?;
                     let vertices = Vec::new();
                     let source = Self { file, primitive, positions, mode, draco, vertices, tally };
@@ -299,7 +299,7 @@ impl<'a> Source<'a> {
     fn add<const N: usize, V>(
         &self,
         weight: f32,
-        accessor: Option<json::Index<json::Accessor>>,
+        accessor: Option<AccessorIndex>,
         types: &[Type],
         values: &mut [V],
     ) -> Fallible<()>
@@ -333,7 +333,7 @@ fn open<'a>(
     file: &'a File<'_>,
     draco: Option<&Unpacked>,
     semantic: &Semantic,
-    accessor: json::Index<json::Accessor>,
+    accessor: AccessorIndex,
     types: &[Type],
 ) -> Fallible<Elements<'a>> {
     if let Some(draco) = draco {

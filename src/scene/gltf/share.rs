@@ -16,7 +16,7 @@ use super::bake;
 use super::document::Document;
 use super::limits::{Fallible, check_count};
 use super::part::Part;
-use super::placement::Placement;
+use super::placement::{Placement, Placements};
 use super::primitive::Mesh;
 use crate::bvh;
 use crate::math::box_corners;
@@ -46,7 +46,7 @@ impl Sharing {
     /// Chooses them by what the file says it has; `is_lamp` tells of a primitive whether it shines.
     pub(super) fn choose(
         document: &Document<'_>,
-        placements: &BTreeMap<u32, Vec<Placement>>,
+        placements: &Placements,
         is_lamp: impl Fn(&json::mesh::Primitive) -> bool,
     ) -> Fallible<Self> {
         let (mut wanted, mut spared, mut all) = (BTreeSet::new(), 0_u64, 0_u64);

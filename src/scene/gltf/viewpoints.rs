@@ -62,12 +62,7 @@ pub(super) fn cameras(
     Ok(cameras.into_iter().map(|(_, camera, path)| (camera, path)).unzip())
 }
 
-fn camera(
-    source: &json::Camera,
-    name: String,
-    world_from_camera: DAffine3,
-    notices: &mut Notices,
-) -> Camera {
+fn camera(source: &json::Camera, name: String, world: DAffine3, notices: &mut Notices) -> Camera {
     let (size, projection) = match (&source.perspective, &source.orthographic) {
         (None, Some(parallel)) => {
             let height = Some(parallel.ymag.abs()).filter(|y| *y > 0.0 && y.is_finite());
@@ -79,13 +74,12 @@ fn camera(
             (fov, Projection::Perspective { fov_y_radians: fov.unwrap_or(DEFAULT_FOV_Y_RADIANS) })
         }
     };
-    if size.is_none() || !world_from_camera.is_finite() {
+    if size.is_none() || !world.is_finite() {
         notices.add(format!("camera {name} is damaged; the unusable values are replaced"));
     }
-    let world_from_camera =
-        if world_from_camera.is_finite() { world_from_camera } else { DAffine3::IDENTITY };
+    let world = if world.is_finite() { world } else { DAffine3::IDENTITY };
     let [lens_radius, focus_distance] = lens(&source.extras).unwrap_or([0.0, 1.0]);
-    let world_from_camera = world_from_camera.as_affine3a();
+    let world_from_camera = world.as_affine3a();
     Camera { name, world_from_camera, projection, lens_radius, focus_distance }
 }
 
