@@ -15,10 +15,8 @@ const SLIT: [f32; 4] = [0.75, 1.6, 2.25, 1.62];
 /// Builds the scene.
 pub(super) fn build() -> Scene {
     let b = &mut Builder::new("crack");
-    let bricks = b.texture(
-        textures::bricks([0.62, 0.42, 0.32], [0.60, 0.57, 0.52], 6, 18),
-        Vec2::new(1.5, 1.35),
-    );
+    let bricks = textures::bricks([0.62, 0.42, 0.32], [0.60, 0.57, 0.52], 6, 18);
+    let bricks = b.texture(bricks, Vec2::new(1.5, 1.35));
     let slabs = b.texture(textures::stones([0.46, 0.43, 0.39], 4, 3, 0.02), Vec2::splat(2.0));
     let pine = b.texture(textures::timber([0.58, 0.42, 0.25]), Vec2::new(1.2, 0.6));
     let brick = b.material(textured("brick", bricks, 0.9));
@@ -108,11 +106,8 @@ fn barrel(b: &mut Builder, wood: Mat, iron: Mat, height: f32) {
     let staves = (0..=16).map(|k| k as f32 / 16.0).map(|t| (radius(t), t * height));
     let mut profile = vec![(0.0, 0.01), (radius(0.0) - 0.02, 0.01), (radius(0.0) - 0.018, 0.0)];
     profile.extend(staves);
-    profile.extend([
-        (radius(1.0) - 0.018, height),
-        (radius(1.0) - 0.022, height - 0.03),
-        (0.0, height - 0.03),
-    ]);
+    let rim = radius(1.0);
+    profile.extend([(rim - 0.018, height), (rim - 0.022, height - 0.03), (0.0, height - 0.03)]);
     b.lathe(wood, 48, profile);
     for t in [0.04, 0.22, 0.78, 0.96] {
         let (y, r) = (t * height, radius(t));

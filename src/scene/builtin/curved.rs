@@ -69,12 +69,9 @@ impl Builder {
             for k in 0..=segments {
                 let turn = k as f32 / segments as f32;
                 let (sin, cos) = (turn * TAU).sin_cos();
+                let turned = |v: Vec2| Vec3::new(v.x * cos, v.y, v.x * sin);
                 for (p, n, along) in [(points[i], start, length), (points[i + 1], end, next)] {
-                    self.vertex((
-                        Vec3::new(p.x * cos, p.y, p.x * sin),
-                        Vec3::new(n.x * cos, n.y, n.x * sin),
-                        Vec2::new(turn * girth, along),
-                    ));
+                    self.vertex((turned(p), turned(n), Vec2::new(turn * girth, along)));
                 }
             }
             self.join(mat, first, [1, segments]);
@@ -126,11 +123,8 @@ impl Builder {
                 let turn = k as f32 / segments as f32;
                 let (sin, cos) = (turn * TAU).sin_cos();
                 let normal = side * cos + other * sin;
-                self.vertex((
-                    centre + normal * radius,
-                    normal,
-                    Vec2::new(length, turn * TAU * radius),
-                ));
+                let uv = Vec2::new(length, turn * TAU * radius);
+                self.vertex((centre + normal * radius, normal, uv));
             }
         }
         let pieces = path.len() as u32 - 1;
@@ -157,7 +151,7 @@ impl Builder {
     /// The body `(|x|^k + |z|^k)^(j/k) + |y|^j = 1`, scaled to `half` extents about `centre`, of
     /// `6 n^2` quads: an ellipsoid for `[k, j] = [2, 2]`, a cushion for `[6, 2.4]`.
     pub(super) fn blob(&mut self, mat: Mat, centre: Vec3, half: Vec3, [k, j]: [f32; 2], n: u32) {
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+        let axes = Vec3::AXES;
         for face in 0..6 {
             let (axis, sign) = (face % 3, if face < 3 { 1.0 } else { -1.0 });
             let (b, c) = (axes[(axis + 1) % 3] * sign, axes[(axis + 2) % 3]);
@@ -177,11 +171,8 @@ impl Builder {
                         Vec3::new(wide * slope(p.x, k), slope(p.y, j), wide * slope(p.z, k));
                     let place = p * half;
                     let uv = Vec2::new(place.dot(b.abs()), place.dot(c));
-                    self.vertex((
-                        centre + place,
-                        (gradient / half).normalize_or(axes[axis] * sign),
-                        uv,
-                    ));
+                    let normal = (gradient / half).normalize_or(axes[axis] * sign);
+                    self.vertex((centre + place, normal, uv));
                 }
             }
             self.join(mat, first, [n, n]);

@@ -72,13 +72,8 @@ pub(super) fn house(
     b.slab(m.roof, [x0 + 0.1, height, z0 + 0.1], [x1 - 0.1, height + 0.5, z1 - 0.1], 0.05);
 }
 
-fn front(
-    b: &mut Builder,
-    m: &HouseMats,
-    [width, height]: [f32; 2],
-    (floors, shops): (u32, bool),
-    side: usize,
-) {
+fn front(b: &mut Builder, m: &HouseMats, size: [f32; 2], rows: (u32, bool), side: usize) {
+    let ([width, height], (floors, shops)) = (size, rows);
     let bays = (width / BAY).round().max(1.0) as u32;
     let bay = width / bays as f32;
     let storey = (height - GROUND - 0.4) / floors as f32;
@@ -194,11 +189,8 @@ pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
         let t = k as f32 / 10.0;
         profile.push((r * (1.0 - 0.12 * t * t), 0.25 + (height - 0.62) * t));
     }
-    profile.extend([
-        (0.98 * r, height - 0.34),
-        (0.98 * r, height - 0.31),
-        (0.9 * r, height - 0.29),
-    ]);
+    let neck = [(0.98 * r, height - 0.34), (0.98 * r, height - 0.31), (0.9 * r, height - 0.29)];
+    profile.extend(neck);
     for k in 0..=6 {
         let (s, c) = (k as f32 / 6.0 * 0.5 * PI).sin_cos();
         profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));

@@ -89,17 +89,12 @@ pub(super) fn edges(
 
 /// Raised rectangular moulding on a wall, in the wall's frame.
 pub(super) fn panel_moulding(b: &mut Builder, mat: Mat, [u0, v0, u1, v1]: [f32; 4]) {
-    let (w, z) = (0.03, [-0.004, 0.012]);
-    for (u, v) in [([u0, u0 + w], [v0, v1]), ([u1 - w, u1], [v0, v1])] {
-        b.slab(mat, [u[0], v[0], z[0]], [u[1], v[1], z[1]], 0.006);
+    let (w, z0, z1) = (0.03, -0.004, 0.012);
+    for (left, right) in [(u0, u0 + w), (u1 - w, u1)] {
+        b.slab(mat, [left, v0, z0], [right, v1, z1], 0.006);
     }
     for v in [v0, v1 - w] {
-        b.slab(
-            mat,
-            [u0 + 0.002, v + 0.0005, z[0]],
-            [u1 - 0.002, v + w - 0.0005, z[1] - 0.0008],
-            0.006,
-        );
+        b.slab(mat, [u0 + 0.002, v + 0.0005, z0], [u1 - 0.002, v + w - 0.0005, z1 - 0.0008], 0.006);
     }
 }
 

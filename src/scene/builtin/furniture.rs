@@ -87,14 +87,8 @@ pub(super) fn bookcase(
 }
 
 /// A cabinet with `columns` x `rows` drawer fronts and small handles, on a recessed plinth.
-pub(super) fn drawers(
-    b: &mut Builder,
-    body: Mat,
-    metal: Mat,
-    size: [f32; 3],
-    [columns, rows]: [u32; 2],
-) {
-    let [width, height, depth] = size;
+pub(super) fn drawers(b: &mut Builder, body: Mat, metal: Mat, size: [f32; 3], grid: [u32; 2]) {
+    let ([width, height, depth], [columns, rows]) = (size, grid);
     let (x, z) = (0.5 * width, 0.5 * depth);
     b.slab(body, [-x + 0.02, 0.0, -z + 0.01], [x - 0.02, 0.07, z - 0.04], 0.0);
     b.slab(body, [-x, 0.06, -z], [x, height, z - 0.02], 0.004);

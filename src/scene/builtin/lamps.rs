@@ -48,13 +48,8 @@ pub(super) fn drum_shade(b: &mut Builder, cloth: Mat, bottom: f32, top: f32, hei
 }
 
 /// A pendant on a cable from the ceiling at y = 0, its shade `drop` below.
-pub(super) fn pendant(
-    b: &mut Builder,
-    metal: Mat,
-    [inside, bulb]: [Mat; 2],
-    drop: f32,
-    radius: f32,
-) {
+pub(super) fn pendant(b: &mut Builder, mats: [Mat; 3], drop: f32, radius: f32) {
+    let [metal, inside, bulb] = mats;
     b.drum(metal, [-0.03, 0.01], [0.05, 0.055], 0.004);
     b.rod(inside, Vec3::Y * -0.02, Vec3::Y * (0.10 - drop), 0.003);
     let outer = (0..=16).map(|i| {

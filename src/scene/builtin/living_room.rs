@@ -27,10 +27,8 @@ palette! {
         let ([boucle], loops) = materials::weave(b, 0.16, 32, [[0.74, 0.69, 0.60]]);
         let linen = b.texture(textures::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
         let ochre = b.texture(textures::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
-        let rug = b.texture(
-            textures::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
-            Vec2::new(2.9, 2.0),
-        );
+        let rug = textures::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]);
+        let rug = b.texture(rug, Vec2::new(2.9, 2.0));
         let arts = [0, 1, 2].map(|seed| materials::painting(b, seed));
     }
     wall = embossed(textured("wall", plaster, 0.85), trowel),
@@ -229,7 +227,7 @@ fn corners(b: &mut Builder, m: &Palette) {
         });
     });
     b.moved([-0.35, SIZE[1], -0.1], |b| {
-        lamps::pendant(b, m.copper, [m.white, m.bulbs[1]], 0.95, 0.24);
+        lamps::pendant(b, [m.copper, m.white, m.bulbs[1]], 0.95, 0.24);
     });
     b.standing([2.42, 0.0, 1.52], 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.40);

@@ -57,29 +57,16 @@ impl Builder {
     }
 
     fn image(&mut self, image: TextureImage, size_metres: Vec2, srgb: bool) -> TextureRef {
-        let index = self.scene.images.len() as u32;
-        self.scene.images.push(image);
-        self.scene.textures.push(Texture {
-            image: index,
-            wrap_u: Wrap::Repeat,
-            wrap_v: Wrap::Repeat,
-            nearest: false,
-            srgb,
-        });
+        let (image, wrap) = (appended(&mut self.scene.images, image), Wrap::Repeat);
+        let texture = Texture { image, wrap_u: wrap, wrap_v: wrap, nearest: false, srgb };
+        let texture = appended(&mut self.scene.textures, texture);
         let transform = glam::Affine2::from_scale(size_metres.recip());
-        TextureRef { texture: index, uv_set: 0, transform }
+        TextureRef { texture, uv_set: 0, transform }
     }
 
     /// Adds a pinhole camera for a 16:9 picture.
-    pub(super) fn camera(
-        &mut self,
-        name: &str,
-        eye: [f32; 3],
-        target: [f32; 3],
-        fov_y_degrees: f32,
-    ) {
-        let mut camera =
-            Camera::look_at(Vec3::from(eye), Vec3::from(target), fov_y_degrees.to_radians());
+    pub(super) fn camera(&mut self, name: &str, eye: [f32; 3], target: [f32; 3], fov_degrees: f32) {
+        let mut camera = Camera::look_at(eye.into(), target.into(), fov_degrees.to_radians());
         name.clone_into(&mut camera.name);
         self.scene.cameras.push(camera);
     }
@@ -163,11 +150,8 @@ impl Builder {
     pub(super) fn quad(&mut self, mat: Mat, p: Vec3, a: Vec3, b: Vec3) {
         let (u, v) = (a.length(), b.length());
         let corner = |s: f32, t: f32| (p + a * s + b * t, Vec3::ZERO, Vec2::new(u * s, v * t));
-        self.polygon(
-            mat,
-            &[corner(0., 0.), corner(1., 0.), corner(1., 1.), corner(0., 1.)],
-            a.cross(b),
-        );
+        let corners = [corner(0., 0.), corner(1., 0.), corner(1., 1.), corner(0., 1.)];
+        self.polygon(mat, &corners, a.cross(b));
     }
 
     /// A box with rounded-off edges `bevel` wide; texture u runs along its faces' longer sides.

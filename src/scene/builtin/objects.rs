@@ -162,12 +162,8 @@ pub(super) fn fruit(b: &mut Builder, skin: Mat, stalk: Mat, radius: f32, floor: 
 
 /// A framed picture with its lower left corner at the origin of a wall's frame; `art` covers
 /// texture coordinates `[0, width] x [0, height]` with v downwards.
-pub(super) fn picture(
-    b: &mut Builder,
-    [frame, mount, art]: [Mat; 3],
-    [width, height]: [f32; 2],
-    border: f32,
-) {
+pub(super) fn picture(b: &mut Builder, mats: [Mat; 3], [width, height]: [f32; 2], border: f32) {
+    let [frame, mount, art] = mats;
     let (w, z) = (0.022, 0.028);
     b.slab(frame, [0.0, 0.0, 0.002], [w, height, z], 0.003);
     b.slab(frame, [width - w, 0.0, 0.002], [width, height, z], 0.003);

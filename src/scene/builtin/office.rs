@@ -25,10 +25,8 @@ palette! {
         let tones = [[0.16, 0.24, 0.36], [0.44, 0.43, 0.41]];
         let ([blue, grey], threads) = materials::weave(b, 0.19, 64, tones);
         let linen = b.texture(textures::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
-        let rug = b.texture(
-            textures::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
-            Vec2::new(2.6, 1.7),
-        );
+        let rug = textures::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]);
+        let rug = b.texture(rug, Vec2::new(2.6, 1.7));
         let arts = [1, 0].map(|seed| materials::painting(b, seed));
     }
     wall = embossed(textured("wall", plaster, 0.85), trowel),
@@ -99,7 +97,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     });
     b.part(walls[3].frame(), |b| fittings::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
     for x in [-1.35, 0.95] {
-        b.moved([x, SIZE[1], -0.9], |b| lamps::pendant(b, m.lamp, [m.white; 2], 0.85, 0.20));
+        b.moved([x, SIZE[1], -0.9], |b| lamps::pendant(b, [m.lamp, m.white, m.white], 0.85, 0.20));
     }
 }
 

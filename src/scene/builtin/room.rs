@@ -164,10 +164,7 @@ fn round_hole(b: &mut Builder, mat: Mat, [u, v, r]: [f32; 3], thickness: f32) {
         let at = |n: Vec3, z: f32| {
             (centre + n * r + Vec3::Z * z, -n, Vec2::new(z, n.y.atan2(n.x) / TAU * r))
         };
-        b.polygon(
-            mat,
-            &[at(n0, 0.0), at(n1, 0.0), at(n1, -thickness), at(n0, -thickness)],
-            -n0 - n1,
-        );
+        let soffit = [at(n0, 0.0), at(n1, 0.0), at(n1, -thickness), at(n0, -thickness)];
+        b.polygon(mat, &soffit, -n0 - n1);
     }
 }

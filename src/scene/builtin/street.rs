@@ -17,18 +17,14 @@ palette! {
         let cobbles =
             b.texture(textures::stones([0.40, 0.38, 0.35], 16, 10, 0.07), Vec2::new(2.4, 2.0));
         let flags = b.texture(textures::stones([0.50, 0.48, 0.44], 4, 3, 0.012), Vec2::splat(2.4));
-        let bricks = b.texture(
-            textures::bricks([0.52, 0.26, 0.18], [0.52, 0.48, 0.42], 8, 24),
-            Vec2::new(2.0, 1.8),
-        );
+        let bricks = textures::bricks([0.52, 0.26, 0.18], [0.52, 0.48, 0.42], 8, 24);
+        let bricks = b.texture(bricks, Vec2::new(2.0, 1.8));
         let ochre = b.texture(textures::plaster([0.72, 0.52, 0.28], 0.30), Vec2::splat(4.0));
         let pale = b.texture(textures::plaster([0.74, 0.68, 0.57], 0.28), Vec2::splat(4.0));
         let ashlar =
             b.texture(textures::stones([0.60, 0.56, 0.49], 6, 4, 0.01), Vec2::new(3.0, 2.4));
-        let stripes = b.texture(
-            textures::stripes([0.74, 0.70, 0.62], [0.50, 0.10, 0.07], 4),
-            Vec2::new(1.6, 1.0),
-        );
+        let stripes = textures::stripes([0.74, 0.70, 0.62], [0.50, 0.10, 0.07], 4);
+        let stripes = b.texture(stripes, Vec2::new(1.6, 1.0));
         let teak = b.texture(textures::timber([0.42, 0.27, 0.15]), Vec2::new(1.4, 0.7));
         let brick = b.material(textured("brick", bricks, 0.9));
         let ochre = b.material(textured("ochre plaster", ochre, 0.9));

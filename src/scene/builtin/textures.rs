@@ -281,12 +281,8 @@ pub(super) fn painting(seed: u32) -> TextureImage {
             if uv.y < base - 0.15 {
                 break;
             }
-            let hill = tiling_fbm(
-                Vec2::new(uv.x * 3.0, layer as f32),
-                IVec2::new(3, 8),
-                4,
-                seed * 31 + layer,
-            );
+            let place = Vec2::new(uv.x * 3.0, layer as f32);
+            let hill = tiling_fbm(place, IVec2::new(3, 8), 4, seed * 31 + layer);
             let line = base + 0.28 * (hill - 0.5);
             let tone = palette[1 + layer as usize % 3].lerp(palette[0], 0.45 - 0.14 * layer as f32);
             c = c.lerp(tone * (1.0 + 0.5 * brush), smoothstep(0.0, 0.008, uv.y - line));
