@@ -71,10 +71,8 @@ struct Faces<'a> {
 
 impl Faces<'_> {
     fn single(&self, _: &[bool]) -> Vec<Range<usize>> {
-        (0..self.scene.triangles.len())
-            .filter(|&at| self.may_pair(at))
-            .map(|at| at..at + 1)
-            .collect()
+        let all = (0..self.scene.triangles.len()).filter(|&at| self.may_pair(at));
+        all.map(|at| at..at + 1).collect()
     }
 
     fn twos(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
@@ -110,10 +108,9 @@ impl Faces<'_> {
     /// Whether a triangle adds one corner to a face in its plane.
     fn goes_on(&self, face: &Range<usize>, triangle: usize) -> bool {
         let materials = &self.scene.triangle_materials;
-        if materials[triangle] != materials[face.start] {
-            return false;
-        }
-        if self.normal(face.start).dot(self.normal(triangle)) < MIN_COSINE {
+        if materials[triangle] != materials[face.start]
+            || self.normal(face.start).dot(self.normal(triangle)) < MIN_COSINE
+        {
             return false;
         }
         let known = || face.clone().flat_map(|at| self.scene.corners_at((at, None)));

@@ -128,16 +128,12 @@ impl Scene {
     pub fn hull_points(&self, is_wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = Vec3> {
         let corners = |place: usize| self.triangles[place].map(|v| self.positions[v as usize]);
         let is_wanted = move |place: &usize| is_wanted(self.triangle_materials[*place]);
-        let boxes: Vec<_> = self
-            .instances
-            .meshes()
-            .iter()
-            .map(|mesh| {
-                let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
-                let ends = mesh.flat_map(corners).map(|point| [point, point]);
-                ends.reduce(|[low, high], [point, _]| [low.min(point), high.max(point)])
-            })
-            .collect();
+        let around = |mesh: &Range<u32>| {
+            let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
+            let ends = mesh.flat_map(corners).map(|point| [point, point]);
+            ends.reduce(|[low, high], [point, _]| [low.min(point), high.max(point)])
+        };
+        let boxes: Vec<_> = self.instances.meshes().iter().map(around).collect();
         let of_instances = self.instances.iter().flat_map(move |instance| {
             let corners = boxes[instance.mesh as usize].into_iter().flat_map(box_corners);
             corners.map(|corner| instance.placing.position(corner))

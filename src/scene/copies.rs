@@ -141,16 +141,10 @@ impl<'a> Triangles<'a> {
 
     /// The corners, beginning with that of the lowest coordinates.
     fn turned(&self, place: usize) -> [u32; 3] {
-        let corners = self.scene.triangles[place];
-        let [a, b, c] = corners.map(|corner| self.position(corner));
-        let [i, j, k] = corners;
-        if a <= b && a <= c {
-            corners
-        } else if b <= c {
-            [j, k, i]
-        } else {
-            [k, i, j]
-        }
+        let mut corners = self.scene.triangles[place];
+        let first = (0..3).min_by_key(|i| self.position(corners[*i]));
+        corners.rotate_left(first.unwrap_or(0));
+        corners
     }
 
     fn position(&self, corner: u32) -> [u32; 3] {
