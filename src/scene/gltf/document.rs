@@ -90,6 +90,11 @@ impl<'a> Document<'a> {
             extensions,
         })
     }
+
+    /// The scene that is shown, if the file has any.
+    pub(super) fn shown_scene(&self) -> json::Index<json::Scene> {
+        self.scene.unwrap_or(json::Index::new(0))
+    }
 }
 
 /// The text of a `.gltf` or of a `.glb`'s JSON, and the GLB's binary chunk.

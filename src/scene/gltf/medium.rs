@@ -28,10 +28,9 @@ pub(super) fn medium(
     frame: Frame,
     notices: &mut Notices,
 ) -> Fallible<Option<Medium>> {
-    let scene = document.scene.unwrap_or(json::Index::new(0));
     let mut media = Vec::new();
     if document.scenes.len() > 0 {
-        let scene: Tops = document.scenes.get_as(scene)?;
+        let scene: Tops = document.scenes.get_as(document.shown_scene())?;
         let medium = fog(&scene.extras).and_then(|keys| read(&keys, "the scene", notices));
         media.extend(medium.map(|medium| frame.medium(medium)));
     }

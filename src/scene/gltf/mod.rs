@@ -135,13 +135,17 @@ fn read_in(
     let file = File::new(document, binary, folder);
     file.check_outputs(&options.outputs)?;
     let document = &file.document;
-    let mut nodes = Nodes::new(document, DAffine3::IDENTITY, &mut notices)?;
+    let mut nodes = Nodes::new(document, DAffine3::IDENTITY)?;
+    if document.scenes.len() > 1 {
+        let (count, shown) = (document.scenes.len(), document.shown_scene());
+        notices.add(format!("the file has {count} scenes; scene {shown} is shown"));
+    }
     let mut placements = placements(&file, &nodes)?;
     let is_known = frame.is_some();
     let frame = frame.map_or_else(|| bounds(&file, &nodes, &placements).map(Frame::suiting), Ok)?;
     if !frame.is_identity() {
         // Again, from where f32 is exact enough; what there was to be said has been said.
-        nodes = Nodes::new(document, frame.transform(), &mut Notices::default())?;
+        nodes = Nodes::new(document, frame.transform())?;
         placements = placement::placements(&file, &nodes)?;
     }
     let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, frame, &mut notices)?;

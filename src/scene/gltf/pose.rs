@@ -15,7 +15,6 @@ use super::document::Document;
 use super::lenient::whole;
 use super::limits::Fallible;
 use super::objects::Objects;
-use crate::error::Notices;
 use crate::memory;
 
 /// In place of a node that is not there.
@@ -76,14 +75,9 @@ struct Skin {
 
 impl Nodes {
     /// Walks the hierarchy; loops, shared children and missing nodes are errors. `world` is world from file.
-    pub(super) fn new(
-        document: &Document<'_>,
-        world: DAffine3,
-        notices: &mut Notices,
-    ) -> Fallible<Self> {
+    pub(super) fn new(document: &Document<'_>, world: DAffine3) -> Fallible<Self> {
         let (hierarchy, skins) = Hierarchy::new(&document.nodes)?;
-        let count = document.nodes.len();
-        let mut marks = vec![0; count];
+        let mut marks = vec![0; document.nodes.len()];
         for skin in skins {
             for node in document.skins.get_as::<Skin>(skin)?.joints {
                 document.nodes.text(node)?;
@@ -95,12 +89,7 @@ impl Nodes {
             hierarchy.tops().map(Index::new).collect()
         } else {
             // The default scene, else the first one.
-            let shown = document.scene.unwrap_or(Index::new(0));
-            let count = scenes.len();
-            if count > 1 {
-                notices.add(format!("the file has {count} scenes; scene {shown} is shown"));
-            }
-            let scene: Tops = scenes.get_as(shown)?;
+            let scene: Tops = scenes.get_as(document.shown_scene())?;
             for &node in &scene.nodes {
                 document.nodes.text(node)?;
             }
