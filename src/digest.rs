@@ -57,9 +57,8 @@ impl Digest {
         if instances.is_empty() {
             return self;
         }
-        instances
-            .iter()
-            .fold(self.debug(&instances.meshes()), |digest, instance| digest.debug(instance))
+        let meshes = self.debug(&instances.meshes());
+        instances.iter().fold(meshes, |digest, instance| digest.debug(instance))
     }
 
     /// Takes in a map.

@@ -84,13 +84,12 @@ fn lamps() -> Vec<Disc> {
         Vec3::new(1.0, 0.45, 0.3),
     ];
     let mut stream = Stream::new(20_180_812);
-    (0..40)
-        .map(|_| Disc {
-            direction: direction(stream.between(0.0, 360.0), stream.between(-4.0, 28.0)),
-            radius_radians: f64::from(stream.between(0.25, 1.2)).to_radians(),
-            radiance: 10_f32.powf(stream.between(1.3, 2.9)) * COLOURS[stream.index(COLOURS.len())],
-        })
-        .collect()
+    let lamp = |_| Disc {
+        direction: direction(stream.between(0.0, 360.0), stream.between(-4.0, 28.0)),
+        radius_radians: f64::from(stream.between(0.25, 1.2)).to_radians(),
+        radiance: 10_f32.powf(stream.between(1.3, 2.9)) * COLOURS[stream.index(COLOURS.len())],
+    };
+    (0..40).map(lamp).collect()
 }
 
 /// Coverage in `[0,1]` of clouds on a flat layer seen along `d`, `amount` of the sky; and how thick

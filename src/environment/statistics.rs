@@ -48,21 +48,18 @@ impl Statistics {
         // Each row of patches lends half of itself to the row of texels above and below it.
         let share = |is_pole: bool, row| if is_pole { 1.0 } else { 0.5 } * solid_angle(row);
         let row_weight = |y: u32| share(y == 0, y) + share(y + 1 == map.height, y + 1);
-        let rows: Vec<RowStatistics> = map
-            .pixels
-            .par_chunks_exact(map.width as usize)
-            .zip(0..map.height)
-            .map(|(row, y)| {
-                let sum: DVec3 = row.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
-                let values = row.as_flattened();
-                RowStatistics {
-                    sum: sum * row_weight(y),
-                    largest: values.iter().copied().fold(0.0, f32::max),
-                    constant: row.iter().all(|pixel| *pixel == first),
-                    valid: values.iter().all(|value| (0.0..=f32::MAX).contains(value)),
-                }
-            })
-            .collect();
+        let of_row = |(row, y): (&[[f32; 3]], u32)| {
+            let sum: DVec3 = row.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
+            let values = row.as_flattened();
+            RowStatistics {
+                sum: sum * row_weight(y),
+                largest: values.iter().copied().fold(0.0, f32::max),
+                constant: row.iter().all(|pixel| *pixel == first),
+                valid: values.iter().all(|value| (0.0..=f32::MAX).contains(value)),
+            }
+        };
+        let rows = map.pixels.par_chunks_exact(map.width as usize).zip(0..map.height);
+        let rows: Vec<RowStatistics> = rows.map(of_row).collect();
         if !rows.iter().all(|row| row.valid) {
             let cause = "the environment map has radiance that is negative or not finite";
             return Err(Error::new(cause));

@@ -56,14 +56,12 @@ impl Sun {
         }
         let [x, y] = brightest.1;
         let cone = Cone::new(map, [x, y]);
-        let inside: f64 = (0..height)
-            .map(|y| {
-                let row = &map.pixels[(y * width) as usize..][..width as usize];
-                let near = cone.row(y, SUN_RADIUS_DEGREES);
-                let light = near.map(|x| f64::from(luminance(row[x as usize].into())));
-                light.sum::<f64>() * texel_solid_angle(width, height, y)
-            })
-            .sum();
+        let of_row = |y: u32| {
+            let near = cone.row(y, SUN_RADIUS_DEGREES);
+            let light = near.map(|x| f64::from(luminance(map.at(x, y).into())));
+            light.sum::<f64>() * texel_solid_angle(width, height, y)
+        };
+        let inside: f64 = (0..height).map(of_row).sum();
         let [azimuth_degrees, elevation_degrees] = cone.axis_degrees;
         Some(Self {
             texel: [x, y],

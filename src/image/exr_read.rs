@@ -330,12 +330,7 @@ impl BlockDecoder {
 
     /// Pixels as they are stored, NaN where there is no sample: lines hold only the channels that have some
     /// in them.
-    fn decode_subsampled(
-        &self,
-        chunk: Chunk,
-        meta: &MetaData,
-        sampling: &[Step],
-    ) -> Decoded<Block> {
+    fn decode_subsampled(&self, chunk: Chunk, meta: &MetaData, steps: &[Step]) -> Decoded<Block> {
         let damaged = || "is damaged: its channels of lower resolution make no sense".to_owned();
         let mut meta = meta.clone();
         let header = meta.headers.get_mut(chunk.layer_index).ok_or_else(damaged)?;
@@ -347,14 +342,12 @@ impl BlockDecoder {
             (i64::from(first) + row as i64).rem_euclid(down.max(1) as i64) == 0
         };
         // Channels with their bytes in a line.
-        let lines: Vec<(usize, Step, usize)> = (0..)
-            .zip(sampling)
-            .map(|(channel, &step)| {
-                let (sample_type, _) = self.layout[channel];
-                let samples = width / step[0].max(1);
-                (channel, step, samples * sample_type.bytes_per_sample())
-            })
-            .collect();
+        let line = |(channel, &step): (usize, &Step)| {
+            let (sample_type, _) = self.layout[channel];
+            let samples = width / step[0].max(1);
+            (channel, step, samples * sample_type.bytes_per_sample())
+        };
+        let lines: Vec<(usize, Step, usize)> = (0..).zip(steps).map(line).collect();
         let of_row = |row| lines.iter().filter(move |(_, step, _)| has_samples(row, *step));
         let bytes: usize = (0..height).flat_map(of_row).map(|(.., bytes)| bytes).sum();
         let is_b44 = matches!(header.compression, Compression::B44 | Compression::B44A);
@@ -380,7 +373,7 @@ impl BlockDecoder {
                 return Err(damaged());
             }
             header.channels.bytes_per_pixel = bytes / (width * height);
-            for (channel, step) in header.channels.list.iter_mut().zip(sampling) {
+            for (channel, step) in header.channels.list.iter_mut().zip(steps) {
                 channel.sampling = Vec2(step[0], step[1]);
             }
             UncompressedBlock::decompress_chunk(chunk, &meta, false).map_err(decode_cause)?.data

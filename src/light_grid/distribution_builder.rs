@@ -203,14 +203,11 @@ fn power(base: f64, exponent: f64) -> f64 {
 /// Number of the first distributions that fit into `room` bytes (and into 16-bit distribution indices).
 fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
     let mut used = 0;
-    supports
-        .iter()
-        .take(usize::from(u16::MAX))
-        .take_while(|support| {
-            used += TileDistributions::distribution_bytes(tile_count, **support as u32);
-            used <= room
-        })
-        .count()
+    let fits = |support: &&usize| {
+        used += TileDistributions::distribution_bytes(tile_count, **support as u32);
+        used <= room
+    };
+    supports.iter().take(usize::from(u16::MAX)).take_while(fits).count()
 }
 
 /// For each face axis, the share of a Lambertian's density that falls into each tile; last, the shares of

@@ -77,11 +77,10 @@ impl Faces<'_> {
 
     fn twos(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
         let is_left = |at: usize| !is_backed[at] && self.may_pair(at);
-        (1..self.scene.triangles.len())
-            .into_par_iter()
-            .filter(|&at| is_left(at - 1) && is_left(at) && self.goes_on(&(at - 1..at), at))
-            .map(|at| at - 1..at + 1)
-            .collect()
+        let are_two =
+            |&at: &usize| is_left(at - 1) && is_left(at) && self.goes_on(&(at - 1..at), at);
+        let seconds = (1..self.scene.triangles.len()).into_par_iter().filter(are_two);
+        seconds.map(|at| at - 1..at + 1).collect()
     }
 
     fn runs(&self, is_backed: &[bool]) -> Vec<Range<usize>> {

@@ -55,9 +55,8 @@ impl CameraPath {
 
     /// World from camera at a time in seconds; before the first key and after the last as there.
     pub fn at(&self, seconds: f64) -> DAffine3 {
-        unmirrored(
-            self.links.iter().fold(DAffine3::IDENTITY, |world, link| world * link.at(seconds)),
-        )
+        let links = self.links.iter().map(|link| link.at(seconds));
+        unmirrored(links.fold(DAffine3::IDENTITY, |world, link| world * link))
     }
 }
 

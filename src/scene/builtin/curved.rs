@@ -132,12 +132,11 @@ impl Builder {
         let last = first + pieces * (segments + 1);
         for (start, outward) in [(first, -tangent(0)), (last, tangent(path.len() - 1))] {
             let local = self.world_from_part.inverse();
-            let cap: Vec<Corner> = (start..start + segments)
-                .map(|i| {
-                    let p = local.transform_point3(self.scene.positions[i as usize]);
-                    (p, Vec3::ZERO, Vec2::new(p.x, p.z))
-                })
-                .collect();
+            let corner = |i: u32| {
+                let p = local.transform_point3(self.scene.positions[i as usize]);
+                (p, Vec3::ZERO, Vec2::new(p.x, p.z))
+            };
+            let cap: Vec<Corner> = (start..start + segments).map(corner).collect();
             self.polygon(mat, &cap, outward);
         }
     }

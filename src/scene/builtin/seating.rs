@@ -136,11 +136,8 @@ pub(super) fn office_chair(b: &mut Builder, cloth: Mat, plastic: Mat, metal: Mat
         let half = 0.225 - 0.03 * y * y;
         let belly = 0.035 * (1.0 - y * y) - 0.02 * y;
         let rim = ((1.0 - x.abs().powi(6)) * (1.0 - y.abs().powi(6))).max(0.0).sqrt();
-        Vec3::new(
-            x * half,
-            0.83 + 0.28 * y,
-            -0.275 + 0.07 * x * x + belly * 0.5 + side * 0.026 * rim,
-        )
+        let z = -0.275 + 0.07 * x * x + belly * 0.5 + side * 0.026 * rim;
+        Vec3::new(x * half, 0.83 + 0.28 * y, z)
     };
     b.sheet(cloth, [20, 20], Vec2::new(0.46, 0.56), |u, v| shape(u, v, 1.0));
     b.sheet(cloth, [20, 20], Vec2::new(0.46, 0.56), |u, v| shape(1.0 - u, v, -1.0));

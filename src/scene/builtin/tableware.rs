@@ -10,13 +10,12 @@ use super::mesh::{Builder, Mat};
 pub(super) fn smooth(points: &[(f32, f32)], steps: u32) -> Vec<(f32, f32)> {
     let last = points.len() - 1;
     let point = |i: isize| Vec2::from(points[i.clamp(0, last as isize) as usize]);
-    (0..=last as u32 * steps)
-        .map(|k| {
-            let (i, f) = ((k / steps) as isize, (k % steps) as f32 / steps as f32);
-            let p = spline([i - 1, i, i + 1, i + 2].map(point), f);
-            (p.x.max(0.0), p.y)
-        })
-        .collect()
+    let at = |k: u32| {
+        let (i, f) = ((k / steps) as isize, (k % steps) as f32 / steps as f32);
+        let p = spline([i - 1, i, i + 1, i + 2].map(point), f);
+        (p.x.max(0.0), p.y)
+    };
+    (0..=last as u32 * steps).map(at).collect()
 }
 
 /// Catmull and Rom's spline, `f` of the way from the second point to the third.
@@ -75,11 +74,8 @@ pub(super) fn carafe(b: &mut Builder, glass: Mat, drink: Mat, height: f32) {
         smooth(&shape, 8).into_iter().map(|(r, y)| (r * height, y * height)).collect();
     b.lathe(glass, 72, wall.iter().copied());
     let full = 0.50 * height;
-    let mut body: Vec<_> = wall
-        .into_iter()
-        .map(|(r, y)| ((r - 0.0015).max(0.0), y + 0.0012))
-        .take_while(|&(_, y)| y < full)
-        .collect();
+    let inside = wall.into_iter().map(|(r, y)| ((r - 0.0015).max(0.0), y + 0.0012));
+    let mut body: Vec<_> = inside.take_while(|&(_, y)| y < full).collect();
     let (r, y) = body[body.len() - 1];
     body.extend([(r, y + 1e-4), (0.0, y + 1e-4)]);
     b.lathe(drink, 72, body);

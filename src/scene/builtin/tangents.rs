@@ -1,6 +1,6 @@
 //! Tangents along texture u, for normal maps and brushed metals.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 use super::mesh::Builder;
 
@@ -32,19 +32,14 @@ impl Builder {
                 around[i].normal += p.cross(q);
             }
         }
-        scene.tangents = scene
-            .normals
-            .iter()
-            .zip(around)
-            .map(|(&shading, Around { along, across, normal })| -> Vec4 {
-                // Flat corners have the normal of their triangle.
-                let normal = shading.try_normalize().unwrap_or(normal.normalize_or(Vec3::Y));
-                let along = (along - normal * along.dot(normal))
-                    .try_normalize()
-                    .unwrap_or(normal.any_orthonormal_vector());
-                let is_mirrored = normal.cross(along).dot(across) < 0.0;
-                along.extend(if is_mirrored { -1.0 } else { 1.0 })
-            })
-            .collect();
+        let tangent = |(shading, Around { along, across, normal }): (&Vec3, Around)| {
+            // Flat corners have the normal of their triangle.
+            let normal = shading.normalize_or(normal.normalize_or(Vec3::Y));
+            let along = along - normal * along.dot(normal);
+            let along = along.normalize_or(normal.any_orthonormal_vector());
+            let is_mirrored = normal.cross(along).dot(across) < 0.0;
+            along.extend(if is_mirrored { -1.0 } else { 1.0 })
+        };
+        scene.tangents = scene.normals.iter().zip(around).map(tangent).collect();
     }
 }

@@ -199,9 +199,7 @@ impl<'a> Source<'a> {
         let Some(elements) = self.optional(&Semantic::TexCoords(set), &types)? else {
             return Ok(Vec::new());
         };
-        let read = |&vertex: &u32| {
-            usable_uv(Vec2::from_array(elements.floats(vertex as usize)), self.tally)
-        };
+        let read = |&v: &u32| usable_uv(Vec2::from(elements.floats(v as usize)), self.tally);
         Ok(self.vertices.iter().map(read).collect())
     }
 

@@ -183,18 +183,15 @@ impl Shelf {
             decode_ldr(&bytes?, "its data").map_err(|cause| cause.to_string())
         };
         let decoded: Vec<Fallible<LdrImage>> = encoded.into_par_iter().map(decode).collect();
-        let places: Vec<Fallible<u32>> = decoded
-            .into_iter()
-            .map(|result| {
-                let LdrImage { width, height, pixels, is_premultiplied } = result?;
-                let image = TextureImage { width, height, texels: pixels };
-                let place = appended(&mut self.images, image);
-                if is_premultiplied {
-                    self.premultiplied.push(place);
-                }
-                Ok(place)
-            })
-            .collect();
+        let shelve = |result: Fallible<LdrImage>| {
+            let LdrImage { width, height, pixels: texels, is_premultiplied } = result?;
+            let place = appended(&mut self.images, TextureImage { width, height, texels });
+            if is_premultiplied {
+                self.premultiplied.push(place);
+            }
+            Ok(place)
+        };
+        let places: Vec<Fallible<u32>> = decoded.into_iter().map(shelve).collect();
         for (number, source) in new.into_iter().zip(&sources) {
             let place = source.as_ref().map_err(String::clone).and_then(|source| {
                 let found = distinct.binary_search(&source).expect("all sources are in it");
