@@ -36,53 +36,51 @@ mod tableware;
 mod tangents;
 mod textures;
 
+use std::sync::LazyLock;
+
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
 /// The scene shown when none is asked for.
 pub const DEFAULT_SCENE: &str = "living-room";
 
+/// Name, default sky and builder of a scene.
+type BuiltIn = (&'static str, &'static str, fn(&str) -> Scene);
+
+static SCENES: [BuiltIn; 9] = [
+    ("living-room", "sky:day", |name| living_room::build(name, [0.0; 3])),
+    // `sky:night` adds less than a thousandth of the light of a wall by the window.
+    ("evening", "sky:night", |name| living_room::build(name, [0.6, 25.0, 40.0])),
+    ("office", "sky:day", |_| office::build()),
+    ("bathroom", "sky:day", |_| bathroom::build()),
+    ("exterior", "sky:day", |_| street::exterior()),
+    ("fog", "sky:sunset", |_| street::fog()),
+    ("open", "sky:day", |_| open::build()),
+    ("materials", "sky:hallway", |_| still_life::build()),
+    ("crack", "sky:day", |_| crack::build()),
+];
+
+fn find(name: &str) -> Option<&'static BuiltIn> {
+    SCENES.iter().find(|scene| scene.0 == name)
+}
+
 /// Names of the built-in scenes.
 pub fn names() -> &'static [&'static str] {
-    &[
-        "living-room",
-        "evening",
-        "office",
-        "bathroom",
-        "exterior",
-        "fog",
-        "open",
-        "materials",
-        "crack",
-    ]
+    static NAMES: LazyLock<Vec<&str>> =
+        LazyLock::new(|| SCENES.iter().map(|scene| scene.0).collect());
+    &NAMES
 }
 
 /// The default built-in sky of a scene, built in or not.
 pub fn sky(name: &str) -> &'static str {
-    match name {
-        "evening" => "sky:night",
-        "fog" => "sky:sunset",
-        "materials" => "sky:hallway",
-        _ => "sky:day",
-    }
+    find(name).map_or("sky:day", |scene| scene.1)
 }
 
 /// Builds the scene called `name`; an error lists the names there are.
 pub fn build(name: &str) -> Result<Scene> {
-    match name {
-        "living-room" => Ok(living_room::build(name, [0.0; 3])),
-        // `sky:night` adds less than a thousandth of the light of a wall by the window.
-        "evening" => Ok(living_room::build(name, [0.6, 25.0, 40.0])),
-        "office" => Ok(office::build()),
-        "bathroom" => Ok(bathroom::build()),
-        "exterior" => Ok(street::exterior()),
-        "fog" => Ok(street::fog()),
-        "open" => Ok(open::build()),
-        "materials" => Ok(still_life::build()),
-        "crack" => Ok(crack::build()),
-        _ => Err(Error::new(format!(
-            "there is no built-in scene called \"{name}\"; there are {}",
-            names().join(", ")
-        ))),
-    }
+    let (.., build) = find(name).ok_or_else(|| {
+        let names = names().join(", ");
+        Error::new(format!("there is no built-in scene called \"{name}\"; there are {names}"))
+    })?;
+    Ok(build(name))
 }
