@@ -9,32 +9,6 @@ use serde_json::Value;
 
 use super::limits::Fallible;
 
-/// Keys whose whole numbers say which object of the file is meant.
-const INDICES: &[&str] = &[
-    "attributes",
-    "buffer",
-    "bufferView",
-    "camera",
-    "children",
-    "index",
-    "indices",
-    "input",
-    "inverseBindMatrices",
-    "joints",
-    "light",
-    "material",
-    "mesh",
-    "node",
-    "nodes",
-    "output",
-    "sampler",
-    "scene",
-    "skeleton",
-    "skin",
-    "source",
-    "targets",
-];
-
 /// Refuses text that is no JSON, and indices of more than 32 bits: the types would cut them to others.
 /// Of extensions only those that are `read` count. Nothing is kept of the text; returns how many values are in it.
 pub(super) fn check_indices(text: &str, read: &[&str]) -> Fallible<u64> {
@@ -120,7 +94,15 @@ impl<'de> Visitor<'de> for Check<'_> {
             if key == "extras" || (self.of_extensions && !self.read.contains(&&*key)) {
                 object.next_value::<IgnoredAny>()?;
             } else {
-                let is_index = self.of_objects || INDICES.contains(&&*key);
+                // Keys whose whole numbers say which object of the file is meant.
+                let is_index = match &*key {
+                    "attributes" | "buffer" | "bufferView" | "camera" | "children" | "index"
+                    | "indices" | "input" | "joints" | "light" | "material" | "mesh" | "node"
+                    | "nodes" | "output" | "sampler" | "scene" | "skeleton" | "skin" | "source"
+                    | "targets" => true,
+                    "inverseBindMatrices" => true,
+                    _ => self.of_objects,
+                };
                 let of_objects = matches!(&*key, "attributes" | "targets");
                 let of_extensions = key == "extensions";
                 object.next_value_seed(Self { is_index, of_objects, of_extensions, ..self })?;
