@@ -42,10 +42,8 @@ impl CompressedTree {
         let mut tree = Self::default();
         let own = Shared { meshes, instances: &[] }.own(triangles.len()) as u32;
         let top = tree.append(&Items::new(sources, 0..own, &bvh.tree.placed), &tag).1;
-        let (roots, depths): (Vec<u32>, Vec<u32>) = meshes
-            .iter()
-            .map(|mesh| tree.append(&Items::new(sources, mesh.clone(), &[]), &tag))
-            .unzip();
+        let append = |mesh: &Range<u32>| tree.append(&Items::new(sources, mesh.clone(), &[]), &tag);
+        let (roots, depths): (Vec<u32>, Vec<u32>) = meshes.iter().map(append).unzip();
         // In the upper level, each may leave a group of instances waiting, too.
         let below = depths.into_iter().max();
         tree.depth = below.map_or(top, |below| 2 * top + below);

@@ -24,13 +24,9 @@ impl Image {
 
     /// A picture computed pixel by pixel from `(x, y)`.
     pub fn from_fn(width: u32, height: u32, mut f: impl FnMut(u32, u32) -> [f32; 3]) -> Self {
-        let mut pixels = Vec::with_capacity(width as usize * height as usize);
-        for y in 0..height {
-            for x in 0..width {
-                pixels.push(f(x, y));
-            }
-        }
-        Self { width, height, pixels }
+        let (columns, count) = (width as usize, width as usize * height as usize);
+        let pixel = |at: usize| f((at % columns) as u32, (at / columns) as u32);
+        Self { width, height, pixels: (0..count).map(pixel).collect() }
     }
 
     /// Size of a picture of `all_width` x `all_height` pixels made at most `width` pixels wide.

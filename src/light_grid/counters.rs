@@ -47,11 +47,10 @@ impl Counters {
     /// Counters for `cell_count` cells over `tile_count` tiles within `budget_bytes`.
     pub fn new(cell_count: u32, tile_count: u32, budget_bytes: usize) -> Self {
         let fixed = cell_count as usize * 8;
-        let per_slot = Self::slot_bytes(tile_count);
+        let slots = budget_bytes.saturating_sub(fixed) / Self::slot_bytes(tile_count);
         Self {
             tile_count,
-            capacity: (budget_bytes.saturating_sub(fixed) / per_slot).min(cell_count as usize)
-                as u32,
+            capacity: slots.min(cell_count as usize) as u32,
             visits: (0..cell_count).map(|_| AtomicU32::new(0)).collect(),
             slot_of_cell: vec![NO_SLOT; cell_count as usize],
             cell_of_slot: Vec::new(),

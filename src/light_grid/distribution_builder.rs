@@ -45,15 +45,7 @@ impl<'a> DistributionBuilder<'a> {
     ) -> Self {
         let energies = environment.tile_energies();
         let total: f64 = energies.iter().sum();
-        let mut builder = Self {
-            grid,
-            counters,
-            options,
-            map_distribution: energies.iter().map(|e| e / total).collect(),
-            faces: Vec::new(),
-            blocks: Vec::new(),
-            diffuse: Vec::new(),
-        };
+        let map_distribution = energies.iter().map(|e| e / total).collect();
         let mut slots_of_face = vec![Vec::new(); grid.face_count() as usize];
         let mut slots_of_block = BTreeMap::<_, Vec<_>>::new();
         for (slot, &cell) in counters.cells().iter().enumerate() {
@@ -61,7 +53,10 @@ impl<'a> DistributionBuilder<'a> {
             slots_of_face[face as usize].push(slot);
             slots_of_block.entry((face, row / POOL, column / POOL)).or_default().push(slot);
         }
-        builder.blocks = slots_of_block.into_values().collect();
+        let blocks = slots_of_block.into_values().collect();
+        let (faces, diffuse) = Default::default();
+        let mut builder =
+            Self { grid, counters, options, map_distribution, faces, blocks, diffuse };
         if options.recording.is_ratio() {
             builder.faces = slots_of_face.par_iter().map(|slots| builder.sum(slots)).collect();
         }

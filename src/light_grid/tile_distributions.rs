@@ -41,15 +41,9 @@ impl TileDistributions {
     /// No distributions yet, over `tile_count` tiles (at most 65536).
     pub fn new(tile_count: u32) -> Self {
         assert!((1..=65536).contains(&tile_count), "tile indices are 16 bits wide");
-        Self {
-            tile_count,
-            words_per_distribution: tile_count.div_ceil(64),
-            starts: vec![0],
-            masks: Vec::new(),
-            ranks: Vec::new(),
-            tiles: Vec::new(),
-            last: Vec::new(),
-        }
+        let words_per_distribution = tile_count.div_ceil(64);
+        let (masks, ranks, tiles, last) = Default::default();
+        Self { tile_count, words_per_distribution, starts: vec![0], masks, ranks, tiles, last }
     }
 
     /// Number of distributions.
