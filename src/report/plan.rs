@@ -35,47 +35,38 @@ impl Device {
     }
 }
 
-/// Settings that change how fast a picture converges, but not its limit (except a cache's bias).
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Settings {
-    /// How the map is sampled.
-    pub sampling: Sampling,
-    /// How counters become distributions in [`Sampling::Adaptive`].
-    pub distributions: DistributionOptions,
-    /// Importance table.
-    pub table: TableKind,
-    /// Columns and rows of tiles.
-    pub tiles: (u32, u32),
-    /// Light Grid cells around the horizon.
-    pub grid_columns: u32,
-    /// Whether pixels share their second vertices.
-    pub sharing: Sharing,
-    /// How indirect light is found.
-    pub gi: Gi,
-    /// Camera paths to learn from; `None` for the default of the picture's size.
-    pub learning_paths: Option<u64>,
-    /// Point set of the samples.
-    pub points: Points,
-    /// Whether Russian roulette ends dim paths.
-    pub russian_roulette: bool,
+with_defaults! {
+    /// Settings that change how fast a picture converges, but not its limit (except a cache's bias).
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct Settings {
+        /// How the map is sampled.
+        pub sampling: Sampling = Sampling::default(),
+        /// How counters become distributions in [`Sampling::Adaptive`].
+        pub distributions: DistributionOptions = DistributionOptions::ADAPTIVE,
+        /// Importance table.
+        pub table: TableKind = TableKind::default(),
+        /// Columns and rows of tiles.
+        pub tiles: (u32, u32) =
+            (EnvironmentOptions::default().tile_columns, EnvironmentOptions::default().tile_rows),
+        /// Light Grid cells around the horizon.
+        pub grid_columns: u32 = 64,
+        /// Whether pixels share their second vertices.
+        pub sharing: Sharing = Sharing::default(),
+        /// How indirect light is found.
+        pub gi: Gi = Gi::default(),
+        /// Camera paths to learn from; `None` for the default of the picture's size.
+        pub learning_paths: Option<u64> = None,
+        /// Point set of the samples.
+        pub points: Points = Points::default(),
+        /// Whether Russian roulette ends dim paths.
+        pub russian_roulette: bool = true,
+    }
 }
 
 impl Settings {
     /// The settings of `lightgrid render --sampling`.
     pub fn of(sampling: Sampling) -> Self {
-        let environment = EnvironmentOptions::default();
-        Self {
-            sampling,
-            distributions: DistributionOptions::ADAPTIVE,
-            table: environment.table,
-            tiles: (environment.tile_columns, environment.tile_rows),
-            grid_columns: 64,
-            sharing: Sharing::Auto,
-            gi: Gi::Exact,
-            learning_paths: None,
-            points: Points::default(),
-            russian_roulette: true,
-        }
+        Self { sampling, ..Self::default() }
     }
 
     /// Options of the map's importance table.

@@ -17,19 +17,15 @@ pub const KELVIN: RangeInclusive<f32> = 2000.0..=12000.0;
 /// Range of tints.
 pub const TINT: RangeInclusive<f32> = -1.0..=1.0;
 
-/// The light that is shown as white: daylight or a black body of a correlated colour temperature.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct WhiteBalance {
-    /// Within [`KELVIN`]; lower values make a picture cooler, since warm light becomes white.
-    pub kelvin: f32,
-    /// Along green (negative) to magenta (positive), within [`TINT`].
-    pub tint: f32,
-}
-
-impl Default for WhiteBalance {
-    /// No change of colours.
-    fn default() -> Self {
-        Self { kelvin: DAYLIGHT_KELVIN, tint: 0.0 }
+with_defaults! {
+    /// The light that is shown as white: daylight or a black body of a correlated colour temperature. The default
+    /// changes no colours.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    pub struct WhiteBalance {
+        /// Within [`KELVIN`]; lower values make a picture cooler, since warm light becomes white.
+        pub kelvin: f32 = DAYLIGHT_KELVIN,
+        /// Along green (negative) to magenta (positive), within [`TINT`].
+        pub tint: f32 = 0.0,
     }
 }
 
