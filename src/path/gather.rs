@@ -16,7 +16,7 @@ use crate::scene::needs::SceneFeatures;
 #[derive(Default)]
 pub(super) struct ChosenLights {
     /// Tiles of the map, and where in them.
-    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MAX_MAP_SAMPLES],
+    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MAP_SAMPLES as usize],
     /// By which numbers a lamp will be chosen.
     of_lamps: Option<[u32; 2]>,
 }

@@ -38,32 +38,20 @@ pub struct SharedTile {
     pub owner_side: u32,
     /// Radiance estimates behind a second vertex.
     pub continuations: u32,
-    /// Samples of the map at the first vertex.
-    pub map_samples: u32,
 }
 
 impl SharedTile {
     /// One pixel in four keeps its own, which gets four estimates: most for the time.
-    pub const LARGE: Self = Self {
-        side: 8,
-        owner_side: 2,
-        continuations: 4,
-        map_samples: Self::MAX_MAP_SAMPLES as u32,
-    };
+    pub const LARGE: Self = Self { side: 8, owner_side: 2, continuations: 4 };
     /// All keep their own: less noise is shared.
-    pub const SMALL: Self = Self {
-        side: 4,
-        owner_side: 1,
-        continuations: 1,
-        map_samples: Self::MAX_MAP_SAMPLES as u32,
-    };
+    pub const SMALL: Self = Self { side: 4, owner_side: 1, continuations: 1 };
 
-    /// Most samples of the map at one vertex.
-    pub(super) const MAX_MAP_SAMPLES: usize = 3;
+    /// Samples of the map at the first vertex.
+    pub(crate) const MAP_SAMPLES: u32 = 3;
 
     /// Most samples of the map that one path takes, with `bounces` vertices.
     pub fn most_map_samples(&self, bounces: u32) -> u32 {
-        self.map_samples + self.continuations * bounces.saturating_sub(1)
+        Self::MAP_SAMPLES + self.continuations * bounces.saturating_sub(1)
     }
 }
 
@@ -138,7 +126,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
         if let Some(vertex) = path.next_vertex(first_bsdf) {
             let shares = path.is_in_air() && vertex.scatterer.is_alike_nearby();
             if shares {
-                path.map_samples = tile.map_samples;
+                path.map_samples = SharedTile::MAP_SAMPLES;
             } else {
                 path.use_of_vertices = UseOfVertices::alone(start.tracer.cache.is_some());
             }

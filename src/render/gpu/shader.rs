@@ -206,13 +206,13 @@ impl Program {
             declare(&slot.parts);
         }
         if kernel.shares() {
-            let SharedTile { side, owner_side, continuations, map_samples } =
+            let SharedTile { side, owner_side, continuations } =
                 constants.shared_tile.unwrap_or(SharedTile::LARGE);
             declare(&[
                 ("TILE_SIDE", side),
                 ("OWNER_SIDE", owner_side),
                 ("CONTINUATIONS", continuations),
-                ("MAP_SAMPLES", map_samples),
+                ("MAP_SAMPLES", SharedTile::MAP_SAMPLES),
             ]);
         }
         for (index, binding) in bindings.iter().enumerate() {
