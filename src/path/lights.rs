@@ -159,23 +159,16 @@ impl LocalLights {
         })
     }
 
-    /// Density in solid angle with which [`Self::sample`] chooses a point of `triangle` that lies
-    /// `distance` metres away along unit `direction`; 0 if it is not a light.
+    /// Density in solid angle with which [`Self::sample`] chooses a point of `triangle` that lies on this
+    /// `way`, a unit direction and so many metres; 0 if it is not a light.
     pub fn sample_pdf_solid_angle(
         &self,
         scene: &Scene,
         triangle: u32,
         receiver: &Receiver,
-        direction: Vec3,
-        distance: f32,
+        way: (Vec3, f32),
     ) -> f32 {
-        solid_angle_pdf(
-            (&self.triangles, &self.tree),
-            scene,
-            triangle,
-            receiver,
-            (direction, distance),
-        )
+        solid_angle_pdf((&self.triangles, &self.tree), scene, triangle, receiver, way)
     }
 }
 

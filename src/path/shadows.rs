@@ -144,14 +144,10 @@ impl GlassWalk {
                 let emitted = lights::emitted(&world.scene, &point, -ray.direction);
                 walk.emitted += walk.transmittance * emitted;
                 if let Some(receiver) = receiver.filter(|_| emitted.max_element() > 0.0) {
-                    let distance = receiver.position.distance(point.position);
-                    walk.lamp_pdf += tracer.lights.sample_pdf_solid_angle(
-                        &world.scene,
-                        hit.triangle,
-                        receiver,
-                        ray.direction,
-                        distance,
-                    );
+                    let (lights, scene) = (tracer.lights, &world.scene);
+                    let way = (ray.direction, receiver.position.distance(point.position));
+                    walk.lamp_pdf +=
+                        lights.sample_pdf_solid_angle(scene, hit.triangle, receiver, way);
                 }
             }
             let material = world.material(point.material);

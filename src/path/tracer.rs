@@ -485,14 +485,9 @@ impl<'a> Path<'a> {
             self.rays += walk.rays;
             balance_heuristic(from.pdf_solid_angle, walk.lamp_pdf)
         } else {
-            let distance = from.receiver.position.distance(point.position);
-            let nee = self.tracer.lights.sample_pdf_solid_angle(
-                &world.scene,
-                hit.triangle,
-                &from.receiver,
-                self.ray.direction,
-                distance,
-            );
+            let (lights, receiver) = (self.tracer.lights, &from.receiver);
+            let way = (self.ray.direction, receiver.position.distance(point.position));
+            let nee = lights.sample_pdf_solid_angle(&world.scene, hit.triangle, receiver, way);
             balance_heuristic(from.pdf_solid_angle, nee)
         };
         self.radiance += self.throughput * emitted * weight;

@@ -221,8 +221,12 @@ fn lights(fixture: &Fixture) -> Vec<Probe<'_>> {
                 let (triangle, receiver) = (t.take_word(), take_receiver(t));
                 let (direction, distance) = (t.take3(), t.take());
                 let lights = &world.lights;
-                let right =
-                    lights.sample_pdf_solid_angle(scene, triangle, &receiver, direction, distance);
+                let right = lights.sample_pdf_solid_angle(
+                    scene,
+                    triangle,
+                    &receiver,
+                    (direction, distance),
+                );
                 t.near(right, ulps(256.0));
             },
         ),
