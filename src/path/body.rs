@@ -1,7 +1,6 @@
 //! What rays travel through.
 
-use glam::Vec3;
-
+use crate::bvh::Ray;
 use crate::medium::{Fog, Interior};
 
 /// What a ray is in.
@@ -21,18 +20,13 @@ impl Body {
     pub(super) fn stretch(
         &self,
         fog: Option<&Fog>,
-        origin: Vec3,
-        direction: Vec3,
+        ray: &Ray,
         distance: f32,
     ) -> Option<(Interior, f32, f32)> {
-        match self.interior {
-            Some(interior) => {
-                (!interior.is_clear() && distance.is_finite()).then_some((interior, 0.0, distance))
-            }
-            None => fog.and_then(|fog| {
-                let (from, to) = fog.stretch(origin, direction, distance)?;
-                Some((fog.interior, from, to))
-            }),
-        }
+        let Some(interior) = self.interior else {
+            let (from, to) = fog?.stretch(ray.origin, ray.direction, distance)?;
+            return Some((fog?.interior, from, to));
+        };
+        (!interior.is_clear() && distance.is_finite()).then_some((interior, 0.0, distance))
     }
 }

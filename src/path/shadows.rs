@@ -65,7 +65,7 @@ impl Path<'_> {
         let body = behind.copied().unwrap_or(self.body);
         let origin = vertex.scatterer.origin_toward(vertex.position, direction);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * SHADOW_RAY_SHARE };
-        let stretch = body.stretch(self.tracer.fog.as_ref(), origin, direction, distance);
+        let stretch = body.stretch(self.tracer.fog.as_ref(), &ray, distance);
         let left =
             stretch.map_or(Vec3::ONE, |(interior, from, to)| interior.transmittance(to - from));
         let has_glass = world.needs.has(SceneFeatures::CLEAR_SOLIDS);
@@ -133,9 +133,7 @@ impl GlassWalk {
             let hit = world.closest_hit(&ray, false);
             let distance = hit.map_or(ray.t_max, |hit| hit.t);
             let fog = tracer.fog.as_ref();
-            if let Some((interior, from, to)) =
-                body.stretch(fog, ray.origin, ray.direction, distance)
-            {
+            if let Some((interior, from, to)) = body.stretch(fog, &ray, distance) {
                 walk.transmittance *= interior.transmittance(to - from);
             }
             let Some(hit) = hit else { return walk };

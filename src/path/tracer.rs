@@ -372,7 +372,7 @@ impl<'a> Path<'a> {
     fn fly(&mut self, distance: f32) -> Option<Vertex<'static>> {
         let fog = self.tracer.fog.as_ref();
         let (origin, direction) = (self.ray.origin, self.ray.direction);
-        let (interior, from, to) = self.body.stretch(fog, origin, direction, distance)?;
+        let (interior, from, to) = self.body.stretch(fog, &self.ray, distance)?;
         if !interior.scatters() {
             let left = interior.transmittance(to - from);
             self.throughput *= left;
