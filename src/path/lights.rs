@@ -268,11 +268,7 @@ fn spot_attenuation(light: &PunctualLight, to_light: Vec3) -> f32 {
     t * t
 }
 
-/// Windowed falloff that `KHR_lights_punctual` recommends for lights with a range.
+/// Windowed falloff that `KHR_lights_punctual` recommends for lights with a range; 1 where that is infinite.
 fn range_attenuation(light: &PunctualLight, distance: f32) -> f32 {
-    if light.range.is_finite() {
-        (1.0 - (distance / light.range).powi(4)).clamp(0.0, 1.0)
-    } else {
-        1.0
-    }
+    (1.0 - (distance / light.range).powi(4)).clamp(0.0, 1.0)
 }
