@@ -228,12 +228,9 @@ impl World {
             return true;
         }
         let material = self.scene.material_of(hit.triangle);
-        match self.scene.materials[material as usize].alpha_mode {
-            AlphaMode::Mask { cutoff } => {
-                alpha_at(&self.scene, hit.triangle, hit.barycentric) >= cutoff
-            }
-            AlphaMode::Opaque | AlphaMode::Blend => true,
-        }
+        let alpha_mode = self.scene.materials[material as usize].alpha_mode;
+        let AlphaMode::Mask { cutoff } = alpha_mode else { return true };
+        alpha_at(&self.scene, hit.triangle, hit.barycentric) >= cutoff
     }
 
     /// Whether a ray comes from where another surface of the same place is met.
