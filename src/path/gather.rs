@@ -128,9 +128,6 @@ impl Path<'_> {
                 emitted / (pdf + own_pdf)
             }
         };
-        if light == Vec3::ZERO {
-            return None;
-        }
-        Some(Arriving { direction: sample.direction, f, light })
+        (light != Vec3::ZERO).then_some(Arriving { direction: sample.direction, f, light })
     }
 }
