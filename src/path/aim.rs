@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::aim_targets::{AimTargets, Aiming, Facet};
 use super::tracer::{Departure, Path, PathTracer};
 use super::triangles::point_on;
-use super::vertex::{Aim, Scatterer, Vertex};
+use super::vertex::{Aim, Vertex};
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Ray, offset_origin};
 use crate::color::{importance, luminance};
@@ -128,8 +128,7 @@ impl<'a> PathTracer<'a> {
     /// How a path in air aims from a vertex; `None` if it does not.
     pub(super) fn aiming_from(&self, vertex: &Vertex<'_>) -> Option<&'a Aiming> {
         let aiming = self.lights.aiming.as_ref()?;
-        let Scatterer::Surface(surface) = &vertex.scatterer else { return None };
-        surface.is_cacheable().then_some(aiming)
+        vertex.scatterer.surface()?.is_cacheable().then_some(aiming)
     }
 }
 

@@ -18,7 +18,7 @@ use glam::Vec3;
 
 use super::light_tree::{Light, LightTree, Moments, Receiver};
 use super::triangles::{facing, point_on, relate, solid_angle_pdf};
-use super::vertex::{Aim, Onward, Scatterer, SurfaceScatterer, Vertex};
+use super::vertex::{Aim, Onward, SurfaceScatterer, Vertex};
 use crate::sampler::unit_from_bits;
 use crate::scene::{Material, Scene, TextureSlot};
 
@@ -116,10 +116,8 @@ impl AimTargets {
 
     /// Whether a vertex lies on one of them.
     pub(super) fn has(&self, vertex: &Vertex<'_>) -> bool {
-        matches!(
-            &vertex.scatterer,
-            Scatterer::Surface(surface) if self.triangles.binary_search(&surface.triangle).is_ok()
-        )
+        let surface = vertex.scatterer.surface();
+        surface.is_some_and(|surface| self.triangles.binary_search(&surface.triangle).is_ok())
     }
 }
 

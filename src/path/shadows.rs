@@ -13,7 +13,7 @@ use super::light_tree::Receiver;
 use super::lights;
 use super::limits::{MAX_INTERFACES, MAX_PASSES};
 use super::tracer::{Departure, Path, PathTracer};
-use super::vertex::{Scatterer, Vertex};
+use super::vertex::Vertex;
 use crate::bvh::{Ray, offset_origin};
 use crate::scene::needs::SceneFeatures;
 
@@ -56,13 +56,9 @@ impl Path<'_> {
     /// What lies on the way of `distance` metres from a vertex.
     pub(super) fn sight(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Sight {
         let world = self.tracer.world;
-        let behind = match &vertex.scatterer {
-            Scatterer::Surface(surface) => {
-                surface.behind.filter(|_| !surface.sides.is_above(direction))
-            }
-            Scatterer::Medium(_) => None,
-        };
-        let body = behind.copied().unwrap_or(self.body);
+        let surface = vertex.scatterer.surface();
+        let below = surface.filter(|surface| !surface.sides.is_above(direction));
+        let body = below.and_then(|surface| surface.behind).copied().unwrap_or(self.body);
         let origin = vertex.scatterer.origin_toward(vertex.position, direction);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * SHADOW_RAY_SHARE };
         let stretch = body.stretch(self.tracer.fog.as_ref(), &ray, distance);

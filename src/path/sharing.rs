@@ -216,22 +216,16 @@ impl SharedTile {
 impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
-        match self {
-            Self::Surface(surface) => {
-                let bsdf = surface.bsdf();
-                let min_alpha = if bsdf.is_whole() { MIN_WHOLE_ALPHA } else { MIN_SHARED_ALPHA };
-                !surface.refracts && bsdf.is_broad(min_alpha)
-            }
-            Self::Medium(_) => true,
-        }
+        self.surface().is_none_or(|surface| {
+            let bsdf = surface.bsdf();
+            let min_alpha = if bsdf.is_whole() { MIN_WHOLE_ALPHA } else { MIN_SHARED_ALPHA };
+            !surface.refracts && bsdf.is_broad(min_alpha)
+        })
     }
 
     /// Whether a viewer in this direction sees it as all do.
     fn is_true_from(&self, to_viewer: Vec3) -> bool {
-        match self {
-            Self::Surface(surface) => surface.is_true_from(to_viewer),
-            Self::Medium(_) => true,
-        }
+        self.surface().is_none_or(|surface| surface.is_true_from(to_viewer))
     }
 }
 
@@ -252,13 +246,10 @@ impl Path<'_> {
         let share = 1.0 / times as f32;
         let mut incident = Vec::with_capacity(3 * times as usize);
         let mut add = |direction: Vec3, light: Vec3| {
-            let (wi, agrees) = match &vertex.scatterer {
-                Scatterer::Surface(surface) => {
-                    let wi = surface.shading_frame.local_from_world(direction);
-                    (wi, (wi.z > 0.0) == surface.sides.is_above(direction))
-                }
-                Scatterer::Medium(_) => (direction, true),
-            };
+            let (wi, agrees) = vertex.scatterer.surface().map_or((direction, true), |surface| {
+                let wi = surface.shading_frame.local_from_world(direction);
+                (wi, (wi.z > 0.0) == surface.sides.is_above(direction))
+            });
             if agrees && light != Vec3::ZERO {
                 incident.push(Incident { wi, light });
             }
@@ -338,11 +329,9 @@ impl Second<'_, '_> {
 
         connections.clear();
         let position = self.vertex.position;
-        let target = match scatterer {
-            Scatterer::Surface(surface) => offset_origin(position, surface.sides.geometric_normal),
-            Scatterer::Medium(_) => position,
-        };
-        let is_in_medium = matches!(scatterer, Scatterer::Medium(_));
+        let surface = scatterer.surface();
+        let normal = surface.map(|surface| surface.sides.geometric_normal);
+        let target = normal.map_or(position, |normal| offset_origin(position, normal));
         let mut density = 0.0;
         for (pixel, first) in firsts.iter().enumerate() {
             let Some(first) = first else { continue };
@@ -350,10 +339,7 @@ impl Second<'_, '_> {
             let squared = to_second.length_squared();
             let distance = squared.sqrt();
             let direction = to_second / distance;
-            let cosine = match scatterer {
-                Scatterer::Surface(surface) => -surface.sides.geometric_normal.dot(direction),
-                Scatterer::Medium(_) => 1.0,
-            };
+            let cosine = normal.map_or(1.0, |normal| -normal.dot(direction));
             if !(cosine > 0.0 && squared > 0.0) {
                 continue;
             }
@@ -363,16 +349,14 @@ impl Second<'_, '_> {
             }
             let scattered = first.vertex.scatterer.scattered(direction);
             let Some((f, pdf_solid_angle)) = scattered else { continue };
-            let pdf_solid_angle = match (first.aiming, scatterer) {
-                (Some(aiming), Scatterer::Surface(surface)) => {
+            let pdf_solid_angle = match (first.aiming, surface) {
+                (Some(aiming), Some(surface)) => {
                     let at = (surface.triangle, distance);
                     let receiver = first.vertex.receiver();
                     let scene = &tracer.world.scene;
                     aiming.pdf_solid_angle(scene, at, &receiver, direction, pdf_solid_angle)
                 }
-                (Some(aiming), Scatterer::Medium(_)) => {
-                    aiming.probability_of_bsdf() * pdf_solid_angle
-                }
+                (Some(aiming), None) => aiming.probability_of_bsdf() * pdf_solid_angle,
                 (None, _) => pdf_solid_angle,
             };
             let carried = first.throughput * f;
@@ -391,7 +375,7 @@ impl Second<'_, '_> {
             let crossing = tracer.fog.as_ref().map_or(Crossing::CLEAR, |fog| {
                 let stretch = fog.stretch(first.vertex.position, direction, distance);
                 let length = stretch.map_or(0.0, |(from, to)| to - from);
-                fog.interior.crossing(carried, length, is_in_medium)
+                fog.interior.crossing(carried, length, surface.is_none())
             });
             let area = cosine / squared;
             let owner_probability = 1.0 / (tile.owner_side * tile.owner_side) as f32;

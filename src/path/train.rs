@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::limits::PathLimits;
 use super::splitting::UseOfVertices;
 use super::tracer::{Path, PathTracer};
-use super::vertex::{Scatterer, Vertex};
+use super::vertex::Vertex;
 use crate::bvh::Ray;
 use crate::color::luminance;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
@@ -63,7 +63,7 @@ impl PathTracer<'_> {
 
 impl TrainingVertex {
     fn new(path: &Path<'_>, vertex: &Vertex<'_>) -> Option<Self> {
-        let Scatterer::Surface(surface) = &vertex.scatterer else { return None };
+        let surface = vertex.scatterer.surface()?;
         let throughput = path.throughput;
         let trains = path.bounces < TRAINING_VERTICES
             && path.is_in_air()

@@ -22,10 +22,8 @@ pub(super) struct Vertex<'v> {
 impl Vertex<'_> {
     /// What lights are chosen for. What lets light through is lit from behind as well.
     pub(super) fn receiver(&self) -> Receiver {
-        let normal = match &self.scatterer {
-            Scatterer::Surface(surface) if !surface.transmits => surface.shading_frame.z,
-            _ => Vec3::ZERO,
-        };
+        let opaque = self.scatterer.surface().filter(|surface| !surface.transmits);
+        let normal = opaque.map_or(Vec3::ZERO, |surface| surface.shading_frame.z);
         Receiver { position: self.position, normal }
     }
 }
@@ -82,7 +80,13 @@ pub(super) struct SurfaceScatterer<'v> {
     pub(super) is_clear: bool,
 }
 
-impl Scatterer<'_> {
+impl<'v> Scatterer<'v> {
+    /// The surface; `None` in a medium.
+    #[inline(always)]
+    pub(super) fn surface(&self) -> Option<&SurfaceScatterer<'v>> {
+        if let Self::Surface(surface) = self { Some(surface) } else { None }
+    }
+
     /// What share of light from `direction` goes on along the path, and the density with which
     /// the path chooses that direction; `None` if it is no light.
     pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
@@ -97,27 +101,18 @@ impl Scatterer<'_> {
 
     /// Whether next event estimation can find light.
     pub(super) fn gathers(&self) -> bool {
-        match self {
-            Self::Surface(surface) => surface.bsdf().gathers(),
-            Self::Medium(_) => true,
-        }
+        self.surface().is_none_or(|surface| surface.bsdf().gathers())
     }
 
     /// Whether rays in this direction do not start from the vertex itself ([`Sides::lifts`]).
     pub(super) fn lifts(&self, direction: Vec3) -> bool {
-        match self {
-            Self::Surface(surface) => surface.sides.lifts(direction),
-            Self::Medium(_) => false,
-        }
+        self.surface().is_some_and(|surface| surface.sides.lifts(direction))
     }
 
     /// Where a ray from `position` in this direction begins.
     #[inline]
     pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
-        match self {
-            Self::Surface(surface) => surface.sides.origin_toward(position, direction),
-            Self::Medium(_) => position,
-        }
+        self.surface().map_or(position, |surface| surface.sides.origin_toward(position, direction))
     }
 }
 
