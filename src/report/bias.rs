@@ -31,20 +31,16 @@ impl Bias {
     ) -> Option<Self> {
         let unit = mean(reference);
         let reference = block_means(reference);
-        let errors: Vec<Vec<f64>> = pictures
-            .iter()
-            .map(|picture| {
-                let blocks = block_means(picture);
-                let pairs = blocks.pixels.as_flattened().iter();
-                pairs
-                    .zip(reference.pixels.as_flattened())
-                    .map(|(x, r)| {
-                        let (x, r) = (f64::from(*x) / unit, f64::from(*r) / unit);
-                        (x - r) / (r * r + REL_MSE_EPSILON).sqrt()
-                    })
-                    .collect()
-            })
-            .collect();
+        let error = |(x, r): (&f32, &f32)| {
+            let (x, r) = (f64::from(*x) / unit, f64::from(*r) / unit);
+            (x - r) / (r * r + REL_MSE_EPSILON).sqrt()
+        };
+        let errors_of = |picture: &Image| {
+            let blocks = block_means(picture);
+            let pairs = blocks.pixels.as_flattened().iter().zip(reference.pixels.as_flattened());
+            pairs.map(error).collect()
+        };
+        let errors: Vec<Vec<f64>> = pictures.iter().map(errors_of).collect();
         let squared = mean_product(&errors)?;
         let standard_error = (errors.len() > 2).then(|| {
             let count = errors.len() as f64;

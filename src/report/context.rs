@@ -78,15 +78,9 @@ impl Context<'_> {
     }
 
     /// Name of a run: its title and a digest of all that it depends on.
-    pub(super) fn key(
-        &self,
-        state: &RowState,
-        device: usize,
-        method: &Method,
-        seed: u32,
-    ) -> String {
+    pub(super) fn key(&self, row: &RowState, device: usize, method: &Method, seed: u32) -> String {
         let device = &self.devices[device];
-        let digest = self.machine_digest.debug(&state.prepared.digest).debug(&(
+        let digest = self.machine_digest.debug(&row.prepared.digest).debug(&(
             &method.settings,
             Denoiser::Best.name(),
             &device.name,
@@ -94,8 +88,7 @@ impl Context<'_> {
             seed,
             self.file_reference.as_ref().map(|(_, digest)| digest),
         ));
-        let readable =
-            format!("{}-{}-{}", state.prepared.title, device.device.title(), method.name);
+        let readable = format!("{}-{}-{}", row.prepared.title, device.device.title(), method.name);
         let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
         let readable: String = readable.chars().map(plain).collect();
         format!("{}_{seed}_{digest}", &readable[readable.len().saturating_sub(80)..])

@@ -60,17 +60,14 @@ impl Context<'_> {
 
     /// Computes the errors again of all runs whose pictures are stored, if the reference has changed.
     fn evaluate_runs(&self, state: &mut RowState) -> Result<()> {
-        let Some((reference, pictures)) = self.reference(state) else { return Ok(()) };
+        let Some(reference) = self.reference(state) else { return Ok(()) };
         for (key, run) in state.runs.iter_mut().flatten().flatten() {
             let is_new = run.points.iter().all(|p| p.errors.is_some())
-                && pictures.is_some()
-                && run.reference_pictures == pictures;
-            if is_new {
-                continue;
-            }
-            if let Some([films, denoised]) = self.pictures(key, run) {
-                run.evaluate(&films, &denoised, &reference)?;
-                run.reference_pictures = pictures;
+                && reference.1.is_some()
+                && run.reference_pictures == reference.1;
+            let pictures = if is_new { None } else { self.pictures(key, run) };
+            if let Some(pictures) = pictures {
+                run.evaluate(&pictures, &reference)?;
                 self.store.write(key, run)?;
             }
         }

@@ -115,7 +115,7 @@ impl<'a> Place<'a> {
             points,
             reference_pictures: None,
         };
-        Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
+        Ok(Some(Finished { run, pictures: [films, denoised], grid: session.grid().cloned() }))
     }
 }
 
@@ -172,12 +172,11 @@ pub struct Run {
     pub reference_pictures: Option<u32>,
 }
 
-/// A finished run with its pictures, one for each point.
+/// A finished run with its pictures, one of each kind for each point.
 pub(super) struct Finished {
     pub(super) run: Run,
-    pub(super) films: Vec<Image>,
-    /// The same pictures, denoised.
-    pub(super) denoised: Vec<Image>,
+    /// As they were rendered, and denoised.
+    pub(super) pictures: [Vec<Image>; 2],
     /// The learned grid, for measurements after the run.
     pub(super) grid: Option<LightGrid>,
 }
@@ -189,20 +188,21 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 const FIRST_SHARE: f64 = 1.0 / 256.0;
 
 impl Run {
-    /// Computes the errors of its pictures and of the denoised ones, one for each point.
+    /// Computes the errors of its pictures and of the denoised ones, one for each point, against a reference of so many
+    /// pictures.
     ///
     /// # Errors
     /// If the reference is black or a picture is not finite.
     pub(super) fn evaluate(
         &mut self,
-        films: &[Image],
-        denoised: &[Image],
-        reference: &Image,
+        [films, denoised]: &[Vec<Image>; 2],
+        (reference, pictures): &(Image, Option<u32>),
     ) -> Result<()> {
         for (point, (film, denoised)) in self.points.iter_mut().zip(films.iter().zip(denoised)) {
             point.errors = Some(compare(film, reference)?);
             point.denoised_flip = compare(denoised, reference)?.flip;
         }
+        self.reference_pictures = *pictures;
         Ok(())
     }
 }

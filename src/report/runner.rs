@@ -128,50 +128,43 @@ impl Runner<'_> {
     }
 
     /// One run, from disk or measured; `false` if it was cancelled.
-    fn run(
-        &mut self,
-        state: &mut RowState,
-        device: usize,
-        method: usize,
-        seed: u32,
-    ) -> Result<bool> {
+    fn run(&mut self, row: &mut RowState, device: usize, method: usize, seed: u32) -> Result<bool> {
         let plan = self.context.plan;
-        let key = self.context.key(state, device, &plan.methods[method], seed);
+        let key = self.context.key(row, device, &plan.methods[method], seed);
         if let Some(run) = self.context.store.read::<Run>(&key) {
             let has_errors = run.points.iter().all(|p| p.errors.is_some());
             if has_errors || self.context.pictures(&key, &run).is_some() {
-                state.runs[device][method].push((key, run));
+                row.runs[device][method].push((key, run));
                 return Ok(true);
             }
         }
-        self.say_run(state, device, method, seed);
+        self.say_run(row, device, method, seed);
         let settings = &plan.methods[method].settings;
         let (on, cancel) = (&self.context.devices[device], self.context.options.cancel);
         if on.gpu.is_some() {
             // Kernels are compiled, unless they are cached; a GPU may not support them.
-            let ready = state.prepared.place(settings, (on, cancel)).warm_up(settings);
-            if !self.accept(state, device, &ready) {
+            let ready = row.prepared.place(settings, (on, cancel)).warm_up(settings);
+            if !self.accept(row, device, &ready) {
                 return Ok(true);
             }
         }
-        let (place, seconds) = (state.prepared.place(settings, (on, cancel)), plan.effort.seconds);
+        let (place, seconds) = (row.prepared.place(settings, (on, cancel)), plan.effort.seconds);
         let measured = place.measure(&plan.methods[method], seed, seconds)?;
         let Some(mut done) = measured else { return Ok(false) };
         if seed == 0 && on.gpu.is_none() {
             let (grid, seconds) = (done.grid.take(), seconds.min(1.0));
-            done.run.nanoseconds_per_ray = state.prepared.time_rays(on, settings, grid, seconds)?;
+            done.run.nanoseconds_per_ray = row.prepared.time_rays(on, settings, grid, seconds)?;
         }
-        if let Some((reference, pictures)) = self.context.reference(state) {
-            done.run.evaluate(&done.films, &done.denoised, &reference)?;
-            done.run.reference_pictures = pictures;
+        if let Some(reference) = self.context.reference(row) {
+            done.run.evaluate(&done.pictures, &reference)?;
         }
         // Pictures first: a run without them is measured again.
-        self.context.store.write_pictures(&key, &done.films)?;
-        self.context.store.write_pictures(&denoised(&key), &done.denoised)?;
+        self.context.store.write_pictures(&key, &done.pictures[0])?;
+        self.context.store.write_pictures(&denoised(&key), &done.pictures[1])?;
         self.context.store.write(&key, &done.run)?;
-        state.runs[device][method].push((key, done.run));
+        row.runs[device][method].push((key, done.run));
         if self.pages_written.is_none_or(|at| at.elapsed() > PAGES_EVERY) {
-            self.update(state)?;
+            self.update(row)?;
             self.write_pages()?;
         }
         Ok(!self.context.is_cancelled())
@@ -192,7 +185,7 @@ impl Runner<'_> {
         let pictures = self.context.reference(state).and_then(|(_, pictures)| pictures);
         let is_outdated = |(_, run): &&(String, Run)| run.reference_pictures != pictures;
         let outdated: Vec<_> = state.runs.iter().flatten().flatten().filter(is_outdated).collect();
-        outdated.iter().for_each(|(key, _)| self.context.store.remove(key));
+        outdated.iter().for_each(|(key, _)| self.context.store.remove(key, "json"));
         let is_one = !outdated.is_empty();
         if is_one {
             state.runs.iter_mut().flatten().for_each(Vec::clear);
@@ -204,7 +197,7 @@ impl Runner<'_> {
     fn remove_pictures(&self, state: &RowState) {
         let Context { plan, store, .. } = &self.context;
         for (key, _) in state.runs.iter().flatten().flatten() {
-            store.remove_pictures(&denoised(key));
+            store.remove(&denoised(key), "f32");
             let films = store.read_pictures(key, plan.effort.frame.size).unwrap_or_default();
             if let [_, .., last] = films.as_slice() {
                 // A failure only leaves more pictures on the disk.

@@ -81,15 +81,9 @@ impl Store {
         })
     }
 
-    /// Removes the value and the pictures of a name.
-    pub(super) fn remove(&self, key: &str) {
-        // A file that cannot be removed is overwritten by the next measurement.
-        let _ = fs::remove_file(self.path(key, "json"));
-    }
-
-    /// Removes the pictures of a name.
-    pub(super) fn remove_pictures(&self, key: &str) {
-        // A failure only leaves a file on the disk.
-        let _ = fs::remove_file(self.path(key, "f32"));
+    /// Removes the value of a name (`json`) or its pictures (`f32`).
+    pub(super) fn remove(&self, key: &str, extension: &str) {
+        // A value that cannot be removed is overwritten by the next measurement; pictures only take space.
+        let _ = fs::remove_file(self.path(key, extension));
     }
 }
