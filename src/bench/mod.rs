@@ -112,11 +112,7 @@ impl Place<'_> {
     }
 
     /// Seconds to the first picture of another view with distributions learned before; the median of five.
-    fn turn(
-        &self,
-        uploaded: Option<&UploadedScene>,
-        distributions: Option<&LightGrid>,
-    ) -> Result<f64> {
+    fn turn(&self, uploaded: Option<&UploadedScene>, grid: Option<&LightGrid>) -> Result<f64> {
         let mut seconds = Vec::new();
         for round in 0..6_u8 {
             let start = Instant::now();
@@ -125,9 +121,7 @@ impl Place<'_> {
             view.camera.world_from_camera *= turn;
             let mut session = Session::on(self.lit(), view, uploaded)?;
             session.finish_learning();
-            if let Some(distributions) = distributions {
-                session.set_grid(distributions.clone())?;
-            }
+            grid.map_or(Ok(()), |grid| session.set_grid(grid.clone()))?;
             session.advance(1, self.cancel)?;
             session.settle()?;
             // The first round may compile kernels.

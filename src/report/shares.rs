@@ -102,9 +102,7 @@ impl Place<'_> {
         for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
             let frame = Frame { bounces: bounces.min(self.frame.bounces), ..self.frame.clone() };
             let mut session = Place { frame: &frame, ..*self }.session(settings, seed)?;
-            if let Some(grid) = &grid {
-                session.set_grid(grid.clone())?;
-            }
+            grid.clone().map_or(Ok(()), |grid| session.set_grid(grid))?;
             let Some(means) = self.finish(&mut session, samples)? else { return Ok(None) };
             *picture = means;
         }
