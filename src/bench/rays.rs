@@ -35,10 +35,7 @@ impl RayKind {
     pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Diffuse];
 
     fn question(self) -> Question {
-        match self {
-            Self::Shadow => Question::Transmittance,
-            Self::Primary | Self::Diffuse => Question::ClosestHit,
-        }
+        if self == Self::Shadow { Question::Transmittance } else { Question::ClosestHit }
     }
 }
 

@@ -18,18 +18,15 @@ const LARGE_ENCLOSURE: f32 = ROOM_ENCLOSURE;
 impl Sharing {
     /// What this comes to for a view: nothing where paths end in the radiance cache.
     pub(super) fn decided(self, world: &World, view: &View) -> Self {
-        if view.gi == Gi::Cached {
-            return Self::Off;
-        }
-        if self != Self::Auto {
-            return self;
-        }
         let [width, height] = view.whole_size();
         let suits = view.sampling == Sampling::Adaptive
             && view.limits.bounces >= 2
             && width.min(height) >= MIN_SIZE;
-        if !suits {
+        if view.gi == Gi::Cached || (self == Self::Auto && !suits) {
             return Self::Off;
+        }
+        if self != Self::Auto {
+            return self;
         }
         match enclosure(world, view) {
             LARGE_ENCLOSURE.. => Self::Large,

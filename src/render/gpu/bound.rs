@@ -29,10 +29,8 @@ impl Bound {
     ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
         let version = buffers.version;
         let kept = self.bind_group.take().filter(|(of, _)| *of == version);
-        let current = match kept {
-            Some(kept) => kept,
-            None => (version, self.bind(gpu, buffers)?),
-        };
+        let bind = || self.bind(gpu, buffers).map(|bind_group| (version, bind_group));
+        let current = kept.map_or_else(bind, Ok)?;
         let bind_group = self.bind_group.insert(current).1.clone();
         Ok((self.pipeline.pipeline.clone(), bind_group))
     }

@@ -47,15 +47,13 @@ impl Caster {
 
     /// Uploads rays to be traced; they begin where they say, whatever their `t_min`.
     pub(crate) fn put_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        let rays: Vec<CastRay> = rays
-            .iter()
-            .map(|ray| CastRay {
-                origin: ray.origin,
-                t_max: ray.t_max.min(f32::MAX),
-                direction: ray.direction,
-                padding: 0,
-            })
-            .collect();
+        let cast = |&Ray { origin, direction, t_max, .. }: &Ray| CastRay {
+            origin,
+            t_max: t_max.min(f32::MAX),
+            direction,
+            padding: 0,
+        };
+        let rays: Vec<CastRay> = rays.iter().map(cast).collect();
         self.0.buffers.put("cast_rays", bytemuck::cast_slice(&rays), "the list of rays")?;
         self.0.buffers.make("cast_results", 8 * rays.len() as u64, "the list of hits")
     }

@@ -80,7 +80,9 @@ impl Dispatcher {
             compile_seconds: 0.0,
         };
         dispatcher.put_tables(view, environment)?;
-        dispatcher.put_lights(view, world, lights)?;
+        if let Some(lights) = lights {
+            dispatcher.put_lights(view, world, lights)?;
+        }
         let buffers = &mut dispatcher.buffers;
         if features.view.contains(ViewFeatures::COUNTING) {
             // Until there is something to count.
@@ -94,13 +96,7 @@ impl Dispatcher {
     }
 
     /// Uploads these lights.
-    fn put_lights(
-        &mut self,
-        view: &View,
-        world: &World,
-        lights: Option<&LocalLights>,
-    ) -> Result<()> {
-        let Some(lights) = lights else { return Ok(()) };
+    fn put_lights(&mut self, view: &View, world: &World, lights: &LocalLights) -> Result<()> {
         let Self { buffers, globals, features, .. } = self;
         features.view.set(ViewFeatures::LOCAL_LIGHTS, !lights.is_empty());
         features.view.set(ViewFeatures::AIMING, lights.aiming.is_some());
