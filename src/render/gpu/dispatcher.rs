@@ -135,7 +135,7 @@ impl Dispatcher {
 
     /// The tiles of the view.
     pub(super) fn tiles(&self) -> Tiles {
-        Tiles::new(self.globals.width, self.globals.height)
+        Tiles { width: self.globals.width, height: self.globals.height }
     }
 
     /// How many tiles a dispatch has at least, if the device affords so many units of work: what takes a large

@@ -12,16 +12,11 @@ pub(super) const MAX_GROUPS: u64 = 65_535;
 /// The tiles of a picture, row after row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tiles {
-    width: u32,
-    height: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
 }
 
 impl Tiles {
-    /// Of a picture of so many pixels.
-    pub(super) fn new(width: u32, height: u32) -> Self {
-        Self { width, height }
-    }
-
     pub(super) fn count(self) -> u64 {
         u64::from(self.width.div_ceil(TILE)) * u64::from(self.height.div_ceil(TILE))
     }
