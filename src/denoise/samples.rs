@@ -69,7 +69,7 @@ impl<'a> Samples<'a> {
     pub(super) fn first_hits(&self, index: usize) -> [f32; 8] {
         let mut sums = [0.0; 8];
         for film in self.films() {
-            sums.iter_mut().zip(film.surfaces()[index].sums()).for_each(|(sum, more)| *sum += more);
+            sums.iter_mut().zip(film.surfaces[index].sums()).for_each(|(sum, more)| *sum += more);
         }
         sums.map(|sum| sum as f32)
     }

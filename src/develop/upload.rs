@@ -26,11 +26,11 @@ impl LinearPicture {
         }
         let pixels = film.pixels();
         let sums: Vec<[f32; 4]> =
-            pixels.par_iter().map(|pixel| pixel.sums().map(|sum| sum as f32)).collect();
+            pixels.par_iter().map(|pixel| pixel.sums.map(|sum| sum as f32)).collect();
         let counts: Vec<[u32; 4]> = pixels.par_iter().map(|p| [p.samples(), 0, 0, 0]).collect();
         let surfaces = (layers && film.has_layers()).then(|| {
             let sums = |surface: &Surface| surface.sums().map(|sum| sum as f32);
-            let surfaces: Vec<[f32; 8]> = film.surfaces().par_iter().map(sums).collect();
+            let surfaces: Vec<[f32; 8]> = film.surfaces.par_iter().map(sums).collect();
             stored(gpu, &surfaces)
         });
         let (sum, counts) = (stored(gpu, &sums), stored(gpu, &counts));

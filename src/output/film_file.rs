@@ -132,7 +132,7 @@ pub fn write_film(path: &Path, facts: &FilmFacts, film: &Film, skipped: u32) -> 
         for row in film.pixels().chunks(width) {
             put(row.iter().flat_map(|pixel| pixel_words(pixel, skipped)).collect())?;
         }
-        for row in film.surfaces().chunks(width) {
+        for row in film.surfaces.chunks(width) {
             put(row.iter().flat_map(|surface| surface.sums().map(f64::to_bits)).collect())?;
         }
         file.write_all(&digest.value().to_le_bytes())
@@ -141,8 +141,8 @@ pub fn write_film(path: &Path, facts: &FilmFacts, film: &Film, skipped: u32) -> 
 
 fn pixel_words(pixel: &Pixel, skipped: u32) -> [u64; PIXEL_WORDS] {
     let samples = u64::from(pixel.samples() - skipped);
-    let [r, g, b, squared] = pixel.sums().map(f64::to_bits);
-    [samples | u64::from(pixel.invalid()) << 32, r, g, b, squared]
+    let [r, g, b, squared] = pixel.sums.map(f64::to_bits);
+    [samples | u64::from(pixel.invalid) << 32, r, g, b, squared]
 }
 
 /// Reads what [`write_film`] wrote.
@@ -225,5 +225,6 @@ fn in_rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [u64; N]> {
 
 /// Inverse of [`pixel_words`].
 fn pixel_of_words([counts, sums @ ..]: [u64; PIXEL_WORDS]) -> Pixel {
-    Pixel::of_sums(sums.map(f64::from_bits), counts as u32, (counts >> 32) as u32)
+    let sums = sums.map(f64::from_bits);
+    Pixel { sums, samples: counts as u32, invalid: (counts >> 32) as u32 }
 }

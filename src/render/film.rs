@@ -15,9 +15,10 @@ const MIN_LIT: usize = 1000;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pixel {
     /// Red, green, blue and squared luminance.
-    sums: [f64; 4],
-    samples: u32,
-    invalid: u32,
+    pub(crate) sums: [f64; 4],
+    pub(crate) samples: u32,
+    /// Number of samples that were left out because they were not finite.
+    pub(crate) invalid: u32,
 }
 
 /// Sums of what the first surface looks like, when layers are asked for; in f64 for the same reason.
@@ -50,7 +51,7 @@ pub struct Film {
     pub height: u32,
     /// Sums, row after row.
     pub(crate) pixels: Vec<Pixel>,
-    /// Empty unless layers are asked for.
+    /// Sums of first hits, row after row; empty unless layers are asked for.
     pub(crate) surfaces: Vec<Surface>,
 }
 
@@ -71,29 +72,14 @@ impl Pixel {
         self.invalid = self.invalid.saturating_add(other.invalid);
     }
 
-    /// Of sums over `samples` samples: red, green, blue and squared luminance.
-    pub(crate) fn of_sums(sums: [f64; 4], samples: u32, invalid: u32) -> Self {
-        Self { sums, samples, invalid }
-    }
-
     /// Of a mean over `samples` samples and its variance, which is that of its luminance.
     pub(super) fn of_mean(mean: DVec3, variance: f64, samples: u32, invalid: u32) -> Self {
         let count = f64::from(samples);
         let [red, green, blue] = (mean * count).to_array();
-        let pixel = Self::of_sums([red, green, blue, 0.0], samples, invalid);
+        let pixel = Self { sums: [red, green, blue, 0.0], samples, invalid };
         let spread = if samples > 1 { variance * (count - 1.0) } else { 0.0 };
         let squares = count * (pixel.mean_luminance().powi(2) + spread);
-        Self::of_sums([red, green, blue, squares], samples, invalid)
-    }
-
-    /// What [`Self::of_sums`] takes.
-    pub(crate) fn sums(&self) -> [f64; 4] {
-        self.sums
-    }
-
-    /// Number of samples that were left out because they were not finite.
-    pub(crate) fn invalid(&self) -> u32 {
-        self.invalid
+        Self { sums: [red, green, blue, squares], ..pixel }
     }
 
     /// Number of samples taken.
@@ -103,8 +89,7 @@ impl Pixel {
 
     /// Mean radiance; black before the first sample.
     pub fn mean(&self) -> [f64; 3] {
-        let count = f64::from(self.samples.max(1));
-        [0, 1, 2].map(|channel| self.sums[channel] / count)
+        [0, 1, 2].map(|channel| self.sums[channel] / f64::from(self.samples.max(1)))
     }
 
     /// Mean luminance.
@@ -279,11 +264,6 @@ impl Film {
         Some(surface.mean(self.pixels.get(index)?.samples))
     }
 
-    /// Sums of first hits, row after row; empty unless layers are kept.
-    pub(crate) fn surfaces(&self) -> &[Surface] {
-        &self.surfaces
-    }
-
     /// The pixels, row after row.
     pub fn pixels(&self) -> &[Pixel] {
         &self.pixels
@@ -370,13 +350,10 @@ impl Film {
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing
     /// was hit they are zero.
     pub fn surface_layers(&self) -> Option<SurfaceLayers> {
-        if self.surfaces.is_empty() {
-            return None;
-        }
         // Each list gets the room that it takes and no more.
         let pixels = self.surfaces.iter().zip(&self.pixels);
         let means = || pixels.clone().map(|(surface, pixel)| surface.mean(pixel.samples));
-        Some(SurfaceLayers {
+        self.has_layers().then(|| SurfaceLayers {
             albedo: means().map(|(albedo, _, _)| albedo).collect(),
             normal: means().map(|(_, normal, _)| normal).collect(),
             depth: means().map(|(_, _, depth)| depth).collect(),
@@ -422,8 +399,7 @@ impl Film {
                 let length = end.min(row_length) - tile.first()[0] as usize;
                 let own = pixels.split_off_mut(..length).unwrap_or_default();
                 // There are none without layers.
-                let own_surfaces = surfaces.split_off_mut(..length).unwrap_or_default();
-                tile.rows.push((own, own_surfaces));
+                tile.rows.push((own, surfaces.split_off_mut(..length).unwrap_or_default()));
             }
         }
         tiles

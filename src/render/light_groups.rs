@@ -149,7 +149,7 @@ pub(crate) fn mixed(films: &[(&Film, f32)]) -> Film {
             // One that is off tells nothing of the noise.
             variance += if factor > 0.0 { factor * factor * pixel.variance_of_mean() } else { 0.0 };
             samples = samples.min(pixel.samples());
-            invalid += pixel.invalid();
+            invalid += pixel.invalid;
         }
         Pixel::of_mean(mean, variance, samples, invalid)
     };
@@ -158,7 +158,7 @@ pub(crate) fn mixed(films: &[(&Film, f32)]) -> Film {
         let share = f64::from(mixed.samples()) / f64::from(own.samples().max(1));
         Surface::of_sums(surface.sums().map(|sum| sum * share))
     };
-    let surfaces = first.surfaces().par_iter().zip(&pixels).zip(first.pixels()).map(scaled);
+    let surfaces = first.surfaces.par_iter().zip(&pixels).zip(first.pixels()).map(scaled);
     let surfaces = surfaces.collect();
     Film { width: first.width, height: first.height, pixels, surfaces }
 }

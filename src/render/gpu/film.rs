@@ -140,9 +140,9 @@ impl Sums {
         self.rays.store(0, Ordering::Relaxed);
         for (piece, pixels) in film.pixels.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * PIXEL_BYTES;
-            let (high, low) = split(pixels.iter().map(|p| times(p.sums(), self.factors())));
+            let (high, low) = split(pixels.iter().map(|p| times(p.sums, self.factors())));
             let counts: Vec<[u32; 4]> =
-                pixels.iter().map(|pixel| [pixel.samples(), pixel.invalid(), 0, 0]).collect();
+                pixels.iter().map(|pixel| [pixel.samples(), pixel.invalid, 0, 0]).collect();
             buffers.write(PIXELS[0], at, bytemuck::cast_slice(&high));
             buffers.write(PIXELS[1], at, bytemuck::cast_slice(&low));
             buffers.write(PIXELS[2], at, bytemuck::cast_slice(&counts));
@@ -184,9 +184,9 @@ fn take_pixels(pixels: &mut [Pixel], read: &[&[u8]], factors: [f64; 4]) -> u64 {
         .zip(low)
         .zip(counts)
         .with_min_len(4096)
-        .map(|(((pixel, high), low), [samples, invalid, rays, _])| {
-            *pixel = Pixel::of_sums(times(joined(*high, *low), factors), *samples, *invalid);
-            u64::from(*rays)
+        .map(|(((pixel, high), low), &[samples, invalid, rays, _])| {
+            *pixel = Pixel { sums: times(joined(*high, *low), factors), samples, invalid };
+            u64::from(rays)
         })
         .sum()
 }
