@@ -53,10 +53,7 @@ impl Denoiser {
 
     /// What the command line calls the filter that is used.
     pub fn name(self) -> &'static str {
-        match self.found() {
-            Self::Oidn => "oidn",
-            _ => "a-trous",
-        }
+        if self.found() == Self::Oidn { "oidn" } else { "a-trous" }
     }
 
     /// Whether it can be used on this machine.

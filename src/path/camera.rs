@@ -92,10 +92,7 @@ impl CameraRays {
     /// by the third are the pixel (continuous coordinates) at which it is seen through the middle of the lens. What is
     /// behind a perspective camera, and any direction for an orthographic one, has no positive third.
     pub(crate) fn projection(&self) -> [Vec4; 3] {
-        let ahead = match self.orthographic {
-            true => Vec4::W,
-            false => self.row(self.up.cross(self.right)),
-        };
+        let ahead = if self.orthographic { Vec4::W } else { self.row(self.up.cross(self.right)) };
         // The middle of the picture may lie off the axis.
         let middle = if self.orthographic { Vec3::ZERO } else { self.forward };
         let column = self.row(self.right) - ahead * middle.dot(self.right);

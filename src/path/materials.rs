@@ -43,6 +43,7 @@ impl ReadyMaterial {
             let interior = Interior::of_body(material, parameters.absorption);
             Body { interior: Some(interior), squared_index: index * index }
         });
+        let is_pane = material.transmission > 0.0 && material.thickness == 0.0 && !material.unlit;
         let [back, front] = [false, true].map(|front| Bsdf::new(parameters, front));
         Self {
             front,
@@ -52,10 +53,7 @@ impl ReadyMaterial {
                 single_sided: !material.double_sided,
                 backed: material.backed,
                 masked: matches!(material.alpha_mode, AlphaMode::Mask { .. }),
-                partial: material.alpha_mode == AlphaMode::Blend
-                    || (material.transmission > 0.0
-                        && material.thickness == 0.0
-                        && !material.unlit),
+                partial: material.alpha_mode == AlphaMode::Blend || is_pane,
                 clear: material.is_clear_solid(),
             },
             shared,

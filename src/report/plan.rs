@@ -28,10 +28,7 @@ pub enum Device {
 impl Device {
     /// `CPU` or `GPU`.
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Cpu => "CPU",
-            Self::Gpu => "GPU",
-        }
+        if self == Self::Cpu { "CPU" } else { "GPU" }
     }
 }
 
@@ -121,10 +118,7 @@ impl Method {
 
     /// The same method with this way of finding indirect light.
     pub fn with_gi(self, gi: Gi) -> Self {
-        let name = match gi {
-            Gi::Exact => self.name,
-            Gi::Cached => format!("{} cached", self.name),
-        };
+        let name = if gi == Gi::Cached { format!("{} cached", self.name) } else { self.name };
         Self { name, settings: Settings { gi, ..self.settings }, ..self }
     }
 }

@@ -26,10 +26,7 @@ pub(super) struct CastRay {
 
 impl Question {
     fn kernel(self) -> Kernel {
-        match self {
-            Self::ClosestHit => Kernel::ClosestHits,
-            Self::Transmittance => Kernel::ShadowRays,
-        }
+        if self == Self::ClosestHit { Kernel::ClosestHits } else { Kernel::ShadowRays }
     }
 }
 

@@ -39,15 +39,10 @@ impl AdapterFacts {
 
     /// Discrete before integrated before the rest; Vulkan and Metal before DX12, whose old compiler takes long for our
     /// kernels, before OpenGL.
-    fn rank(&self) -> (usize, u32) {
+    fn rank(&self) -> (usize, bool, bool) {
         const KINDS: [&str; 5] = ["discrete", "integrated", "virtual", "other", "software"];
         let kind = KINDS.iter().position(|kind| *kind == self.kind).unwrap_or(KINDS.len());
-        let backend = match self.backend.as_str() {
-            "OpenGL" => 2,
-            "Dx12" => 1,
-            _ => 0,
-        };
-        (kind, backend)
+        (kind, self.backend == "OpenGL", self.backend == "Dx12")
     }
 }
 
