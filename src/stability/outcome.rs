@@ -93,19 +93,19 @@ pub struct Outcome {
     pub figures: Vec<Figure>,
     /// Remarks, such as why the case was skipped.
     pub remarks: Vec<String>,
-    skipped: bool,
-    broken: bool,
+    /// Where figures do not decide.
+    known: Option<Verdict>,
 }
 
 impl Outcome {
     /// A case that cannot be run here.
     pub(super) fn skipped(reason: impl Into<String>) -> Self {
-        Self { remarks: vec![reason.into()], skipped: true, ..Self::default() }
+        Self { remarks: vec![reason.into()], known: Some(Verdict::Skipped), ..Self::default() }
     }
 
     /// A case that could not be finished.
     pub(super) fn broken(reason: impl Into<String>) -> Self {
-        Self { remarks: vec![reason.into()], broken: true, ..Self::default() }
+        Self { remarks: vec![reason.into()], known: Some(Verdict::Failed), ..Self::default() }
     }
 
     /// Adds a figure that must be `most` or less.
@@ -136,20 +136,14 @@ impl Outcome {
     pub(super) fn and(mut self, other: Self) -> Self {
         self.figures.extend(other.figures);
         self.remarks.extend(other.remarks);
-        self.broken |= other.broken;
+        self.known = self.known.or(other.known);
         self
     }
 
     /// The verdict. A case without figures that was not skipped has failed.
     pub fn verdict(&self) -> Verdict {
-        if self.skipped {
-            Verdict::Skipped
-        } else if self.broken || self.figures.is_empty() || !self.figures.iter().all(Figure::holds)
-        {
-            Verdict::Failed
-        } else {
-            Verdict::Passed
-        }
+        let holds = !self.figures.is_empty() && self.figures.iter().all(Figure::holds);
+        self.known.unwrap_or(if holds { Verdict::Passed } else { Verdict::Failed })
     }
 
     /// The decisive figure: the first that fails, else the one nearest to its limit.
