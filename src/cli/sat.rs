@@ -37,8 +37,5 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
             print(format_args!("{title}\n{report}"))?;
         }
     }
-    if arguments.json {
-        print(crate::output::record::to_json(&reports)?)?;
-    }
-    Ok(())
+    if arguments.json { print(crate::output::record::to_json(&reports)?) } else { Ok(()) }
 }

@@ -221,12 +221,8 @@ fn filter_metadata(options: &PictureOptions, films: Films<'_>) -> Vec<(String, S
 /// # Errors
 /// If its noise cannot be taken out.
 pub fn exposure_of(options: &PictureOptions, film: &Film) -> Result<Exposure> {
-    Ok(match options.exposure {
-        Exposure::Auto => {
-            Exposure::Stops(options.exposure.of(film, &balanced(options, film.into())?))
-        }
-        Exposure::Stops(stops) => Exposure::Stops(stops),
-    })
+    let Exposure::Auto = options.exposure else { return Ok(options.exposure) };
+    balanced(options, film.into()).map(|image| Exposure::Stops(Exposure::Auto.of(film, &image)))
 }
 
 /// The film's picture under the light that looks white, without noise if that is asked for.
