@@ -73,11 +73,6 @@ impl Kernel {
         matches!(self, Self::Render | Self::Trace | Self::ConnectSeconds)
     }
 
-    /// Whether it begins samples.
-    pub(super) fn begins_samples(self) -> bool {
-        self.adds_samples() || self == Self::FindSeconds
-    }
-
     /// Whether its paths are not those of pixels.
     pub(super) fn begins_anywhere(self) -> bool {
         matches!(self, Self::Learn | Self::Train)

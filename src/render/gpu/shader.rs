@@ -306,7 +306,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 57] {
         (wgsl!("radiance_cache"), view.contains(ViewFeatures::RADIANCE_CACHE)),
         (wgsl!("count"), view.contains(ViewFeatures::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),
-        (wgsl!("sample"), kernel.begins_samples()),
+        (wgsl!("sample"), kernel.adds_samples() || kernel == Kernel::FindSeconds),
         (wgsl!("anywhere"), kernel.begins_anywhere()),
         (wgsl!("cast"), kernel.casts()),
         (wgsl!("words"), kernel.is_of_queue() || kernel.shares()),
