@@ -93,13 +93,10 @@ fn share_inside(world: &World) -> f32 {
 /// Share of directions in which a surface is seen from its front: near 1 in a room, near 0 within an
 /// object. Looking down does not count, for an object on a ground plane is not inside anything.
 fn share_inside_at(world: &World, place: Vec3) -> f32 {
-    let (mut fronts, mut count) = (0, 0);
-    for direction in directions(128).filter(|d| d.y > -0.2) {
-        count += 1;
-        let sight = look(world, place, direction);
-        fronts += u32::from(sight.is_some_and(|s| s.from_front && s.distance > 0.0));
-    }
-    fronts as f32 / count as f32
+    let directions = directions(128).filter(|direction| direction.y > -0.2);
+    let seen: Vec<_> = directions.map(|direction| look(world, place, direction)).collect();
+    let fronts = seen.iter().flatten().filter(|sight| sight.from_front && sight.distance > 0.0);
+    fronts.count() as f32 / seen.len() as f32
 }
 
 /// Whether a place is in a room, by what is seen from there.

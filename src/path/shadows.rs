@@ -154,10 +154,8 @@ impl GlassWalk {
                     walk.transmittance *= transmitted;
                 } else {
                     let refracted = material.bsdf(&point).refracted(wo);
-                    let Some((wi, weight)) = refracted.filter(|_| interfaces <= MAX_INTERFACES)
-                    else {
-                        break;
-                    };
+                    let refracted = refracted.filter(|_| interfaces <= MAX_INTERFACES);
+                    let Some((wi, weight)) = refracted else { break };
                     walk.transmittance *= weight;
                     ray.direction = point.shading_frame.world_from_local(wi).normalize();
                     if point.geometric_normal.dot(ray.direction) > 0.0 {
@@ -171,11 +169,8 @@ impl GlassWalk {
                 walk.transmittance *= through;
                 uncovered *= through;
             }
-            let is_over = match course {
-                Course::Refracted => walk.transmittance.max_element() <= 0.0,
-                Course::Straight => uncovered.max_element() <= 0.0,
-            };
-            if is_over {
+            let left = if course == Course::Straight { uncovered } else { walk.transmittance };
+            if left.max_element() <= 0.0 {
                 break;
             }
             ray.origin = offset_origin(point.position, -point.geometric_normal);

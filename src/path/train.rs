@@ -41,22 +41,19 @@ impl PathTracer<'_> {
         let tracer = PathTracer { limits, cache: None, counts: None, ..*self };
         let mut path = Path::new(&tracer, ray, sampler);
         path.use_of_vertices = UseOfVertices::Training(TRAINING_VERTICES);
-        let mut training_vertices: Vec<TrainingVertex> =
-            Vec::with_capacity(TRAINING_VERTICES as usize);
+        let mut vertices = Vec::<TrainingVertex>::with_capacity(TRAINING_VERTICES as usize);
         let mut own_bsdf = None;
         while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
             let arrived = path.bounces;
-            for done in
-                training_vertices.extract_if(.., |trained| arrived == trained.vertex + window)
-            {
+            for done in vertices.extract_if(.., |trained| arrived == trained.vertex + window) {
                 done.train(&path, sums, self.cache);
             }
-            training_vertices.extend(TrainingVertex::new(&path, &vertex));
+            vertices.extend(TrainingVertex::new(&path, &vertex));
             if !path.visit(&vertex) {
                 break;
             }
         }
-        training_vertices.iter().for_each(|trained| trained.train(&path, sums, self.cache));
+        vertices.iter().for_each(|trained| trained.train(&path, sums, self.cache));
         path.rays
     }
 }

@@ -28,10 +28,8 @@ impl Context<'_> {
             is_whole =
                 reference.add_picture(&place, self.plan.effort.seconds)? && !self.is_cancelled();
             if reference.is_black() {
-                return Err(Error::new(format!(
-                    "{}: the picture is black, and errors relative to it have no meaning",
-                    state.prepared.title
-                )));
+                let cause = "the picture is black, and errors relative to it have no meaning";
+                return Err(Error::new(format!("{title}: {cause}")));
             }
         }
         state.reference = Some(reference);

@@ -243,13 +243,9 @@ fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
 fn small_beside_large(setting: &Setting) -> Result<Outcome> {
     let environment = constant(1.0)?;
     let scale = 2.5e-4;
-    let ground =
-        |builder: WorldBuilder| builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
-    let dark = {
-        let (builder, camera) = sealed(scale);
-        let world = ground(builder).build();
-        render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?
-    };
+    let (builder, camera) = sealed(scale);
+    let world = builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4).build();
+    let dark = render(setting, (&world, &environment), view(camera, Sampling::Plain, 8), 64)?;
     // The same scene at the room's usual size.
     let lit = |factor: f32| -> Result<Mean> {
         let (builder, camera) = room(0.8, factor, Vec3::ZERO);

@@ -137,17 +137,11 @@ fn white_room(setting: &Setting) -> Result<Outcome> {
 /// Normal maps whose normals lie in the surface, under it, or are zero.
 fn buried_normals(setting: &Setting) -> Result<Outcome> {
     let mut furnaces = Furnaces::new();
-    for texel in [
-        [255, 128, 0, 255],
-        [128, 128, 0, 255],
-        [0, 0, 0, 255],
-        [128, 128, 128, 255],
-        [255, 255, 128, 255],
-    ] {
+    for [x, y, z] in [[255, 128, 0], [128, 128, 0], [0, 0, 0], [128, 128, 128], [255, 255, 128]] {
         for base in [lambert(1.0), metal(0.0), metal(0.5), plastic(0.2)] {
             let material = base.with_texture(TextureSlot::Normal, FIRST_TEXTURE);
-            let builder =
-                with_texel(WorldBuilder::default().floor(&material, Vec3::ZERO, 100.0), texel);
+            let floor = WorldBuilder::default().floor(&material, Vec3::ZERO, 100.0);
+            let builder = with_texel(floor, [x, y, z, 255]);
             let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, 0.4);
             furnaces.add(&furnace(setting, (builder.build(), camera), 16)?);
         }
