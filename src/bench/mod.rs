@@ -100,8 +100,7 @@ impl Place<'_> {
         let start = Instant::now();
         let upload = |gpu| UploadedScene::new(gpu, world, environment);
         let uploaded = self.open.gpu.as_ref().map(upload).transpose()?;
-        let upload_seconds = start.elapsed().as_secs_f64();
-        figures.paths = Some(self.paths(uploaded.as_ref(), upload_seconds)?);
+        figures.paths = Some(self.paths(uploaded.as_ref(), start.elapsed().as_secs_f64())?);
         let (rays, hits) = rays::measure(self, uploaded.as_ref())?;
         figures.rays = rays;
         let view = View { sampling: Sampling::Plain, ..self.view(COMPARED.0) };
@@ -117,8 +116,7 @@ impl Place<'_> {
         for round in 0..6_u8 {
             let start = Instant::now();
             let mut view = self.view(TURNING);
-            let turn = Affine3A::from_rotation_y(0.02 * f32::from(round));
-            view.camera.world_from_camera *= turn;
+            view.camera.world_from_camera *= Affine3A::from_rotation_y(0.02 * f32::from(round));
             let mut session = Session::on(self.lit(), view, uploaded)?;
             session.finish_learning();
             grid.map_or(Ok(()), |grid| session.set_grid(grid.clone()))?;

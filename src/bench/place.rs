@@ -58,8 +58,7 @@ impl Place<'_> {
     pub(super) fn view(&self, (width, height): (u32, u32)) -> View {
         let world = &self.subject.world;
         let camera = world.scene.cameras.first().cloned();
-        let aspect = width as f32 / height as f32;
-        let camera = camera.unwrap_or_else(|| framing::frame(world, aspect));
+        let camera = camera.unwrap_or_else(|| framing::frame(world, width as f32 / height as f32));
         View { sharing: self.options.sharing, ..View::new(camera, [width, height]) }
     }
 }

@@ -144,11 +144,9 @@ fn onward(
     direct: impl Fn([u32; 2], Frame, [f32; 2]) -> Option<Vec3> + Sync,
 ) -> Vec<Ray> {
     let continued = |(index, ray): (usize, &Ray)| {
-        let hit = world.closest_hit(ray, true)?;
-        let point = world.point(&hit, ray.direction);
+        let point = world.point(&world.closest_hit(ray, true)?, ray.direction);
         let mut sampler = Sampler::new(1, 0, index as u32);
-        let bits = sampler.next_pair_bits();
-        let direction = direct(bits, point.shading_frame, sampler.next_pair())?;
+        let direction = direct(sampler.next_pair_bits(), point.shading_frame, sampler.next_pair())?;
         let normal = point.geometric_normal;
         let is_above = normal.dot(direction) > 0.0;
         let origin = offset_origin(point.position, if is_above { normal } else { -normal });

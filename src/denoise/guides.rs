@@ -133,8 +133,7 @@ impl Guides {
     pub(super) fn columns(&self, y: usize, offset: [isize; 2]) -> Option<(Range<usize>, usize)> {
         let [dx, dy] = offset;
         let row = y.checked_add_signed(dy).filter(|row| *row < self.height)?;
-        let before = (-dx).max(0) as usize;
-        let columns = before..self.width.checked_sub(dx.max(0) as usize)?;
+        let columns = (-dx).max(0) as usize..self.width.checked_sub(dx.max(0) as usize)?;
         let first = row * self.width + columns.start.wrapping_add_signed(dx);
         (!columns.is_empty()).then_some((columns, first))
     }

@@ -53,8 +53,7 @@ impl Light {
     #[inline(always)]
     pub(super) fn compare(&self, [here, there]: [usize; 2], weights: &mut [f32]) {
         let at = ([here, there], weights.len());
-        let planes = [&self.luminance, &self.variance];
-        let [luminance, variance] = planes.map(|plane| pairs(plane, at));
+        let [luminance, variance] = [&self.luminance, &self.variance].map(|plane| pairs(plane, at));
         for (i, weight) in weights.iter_mut().enumerate() {
             let difference = luminance.0[i] - luminance.1[i];
             let variance = variance.0[i] + variance.1[i] + MIN_VARIANCE;

@@ -126,8 +126,7 @@ impl Denoiser {
         }
         let larger = film.in_larger_pixels(every);
         let other = other.map(|(other, worth)| (other.in_larger_pixels(every), worth));
-        let other = other.as_ref().map(|(other, worth)| (other, *worth));
-        filter(&larger.without_gaps(), other, every)
+        filter(&larger.without_gaps(), other.as_ref().map(|(other, worth)| (other, *worth)), every)
     }
 }
 

@@ -41,8 +41,7 @@ impl<'a> Samples<'a> {
     pub(super) fn of(film: &'a Film, other: Option<(&'a Film, f32)>) -> Self {
         let of_pixel = |pixel: &Pixel| pixel.mean().into_iter().fold(0.0, f64::max);
         let samples = Self { film, other, scale: 1.0 };
-        let pixels = samples.films().flat_map(Film::pixels);
-        let brightest = pixels.map(of_pixel).fold(0.0, f64::max);
+        let brightest = samples.films().flat_map(Film::pixels).map(of_pixel).fold(0.0, f64::max);
         let scale = match brightest.log2().ceil() {
             exponent if exponent > f64::from(REACH) => 2.0_f64.powf(f64::from(REACH) - exponent),
             _ => 1.0,
@@ -101,8 +100,7 @@ impl<'a> Samples<'a> {
         let vec3 = |pixel: &Pixel| Vec3::from(pixel.mean().map(|c| (self.scale * c) as f32));
         let variance = |pixel: &Pixel| (self.scale * self.scale * pixel.variance_of_mean()) as f32;
         let Some((film, worth)) = self.other else {
-            let variance = (own.samples() > 1).then(|| variance(own));
-            return Mean { rgb: vec3(own), variance };
+            return Mean { rgb: vec3(own), variance: (own.samples() > 1).then(|| variance(own)) };
         };
         let other = &film.pixels()[index];
         let [n, m] = [own, other].map(|pixel| pixel.samples() as f32);

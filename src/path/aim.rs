@@ -59,8 +59,7 @@ fn radiance_of_part(
         let Facet { triangle, area } =
             facets[spans.partition_point(is_before).min(facets.len() - 1)];
         let bits = sampler.next_pair_bits();
-        let u = unit_from_bits(bits[0]);
-        let (position, _) = point_on(&scene.corners(triangle), u, bits[1]);
+        let (position, _) = point_on(&scene.corners(triangle), unit_from_bits(bits[0]), bits[1]);
         let material = &scene.materials[scene.triangle_materials[triangle as usize] as usize];
         let sides = if material.has_inside() { 1 } else { 2 };
         for (side, sum) in radiance.iter_mut().take(sides).enumerate() {
@@ -160,8 +159,7 @@ impl Departure {
 
     /// Probability with which the BSDF chose the direction of the ray, which may have been aimed.
     pub(super) fn probability_of_bsdf(&self, tracer: &PathTracer<'_>) -> f32 {
-        let may_aim = self.aim != Aim::None;
-        let aiming = tracer.lights.aiming.as_ref().filter(|_| may_aim);
+        let aiming = tracer.lights.aiming.as_ref().filter(|_| self.aim != Aim::None);
         aiming.map_or(1.0, Aiming::probability_of_bsdf)
     }
 }

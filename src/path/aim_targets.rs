@@ -71,8 +71,7 @@ impl AimTargets {
             |material: &Material| is_translucent(material) || is_polished_metal(material);
         let few = |facets: &Vec<Facet>| facets.len() <= MAX_TRIANGLES;
         let all = Some(Self::facets_of(scene, is_target)).filter(few);
-        let but_metals = || Some(Self::facets_of(scene, is_translucent)).filter(few);
-        all.or_else(but_metals).unwrap_or_default()
+        all.or_else(|| Some(Self::facets_of(scene, is_translucent)).filter(few)).unwrap_or_default()
     }
 
     /// Triangles of such materials, or one more than may be.

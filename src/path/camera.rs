@@ -49,8 +49,7 @@ impl CameraRays {
     /// size in pixels.
     pub fn cropped(mut self, [left, top]: [u32; 2], [width, height]: [u32; 2]) -> Self {
         let size = Vec2::new(width as f32, height as f32);
-        let corner = Vec2::new(left as f32, top as f32);
-        let middle = (2.0 * corner + size) / self.picture_size - 1.0;
+        let middle = (2.0 * Vec2::new(left as f32, top as f32) + size) / self.picture_size - 1.0;
         let shift = self.right * (middle.x * self.half_extent.x)
             - self.up * (middle.y * self.half_extent.y);
         if self.orthographic {

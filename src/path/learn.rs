@@ -26,8 +26,7 @@ impl PathTracer<'_> {
             if !path.counts_vertex() {
                 break;
             }
-            let counts = vertex.cell.is_some() && path.bounces <= MAX_COUNTED;
-            if counts {
+            if vertex.cell.is_some() && path.bounces <= MAX_COUNTED {
                 for number in 0..tries {
                     let bits = path.sampler.of_estimate(tries, number).next_pair_bits();
                     path.look_at_map(&vertex, bits);

@@ -128,8 +128,7 @@ impl GlassWalk {
             walk.rays += 1;
             let hit = world.closest_hit(&ray, false);
             let distance = hit.map_or(ray.t_max, |hit| hit.t);
-            let fog = tracer.fog.as_ref();
-            if let Some((interior, from, to)) = body.stretch(fog, &ray, distance) {
+            if let Some((interior, from, to)) = body.stretch(tracer.fog.as_ref(), &ray, distance) {
                 walk.transmittance *= interior.transmittance(to - from);
             }
             let Some(hit) = hit else { return walk };

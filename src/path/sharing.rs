@@ -419,8 +419,7 @@ impl<'v> Outgoing<'v> {
             return Self::Directed(surface, incident);
         }
         let upward = bsdf.viewed_from(Vec3::Z);
-        let reflected = |i: &Incident| upward.eval(i.wi) * i.light;
-        let radiance: Vec3 = incident.iter().map(reflected).sum();
+        let radiance: Vec3 = incident.iter().map(|i| upward.eval(i.wi) * i.light).sum();
         match bsdf.left(Vec3::Z) {
             _ if bsdf.is_lambert => Self::Lambert(radiance),
             left if left > 0.0 => Self::Body(surface, radiance / left),

@@ -384,8 +384,7 @@ impl<'a> Path<'a> {
         if self.has_faded() {
             return None;
         }
-        let bits = self.sampler.next_pair_bits();
-        let flight = interior.fly(self.throughput, to - from, bits);
+        let flight = interior.fly(self.throughput, to - from, self.sampler.next_pair_bits());
         self.throughput *= flight.weight;
         let position = origin + direction * (from + flight.scattered_at?);
         // From inside of a solid the map is not seen: it is not asked in vain, and what fog learns is not spoilt.
@@ -534,8 +533,7 @@ impl<'a> Path<'a> {
                 if let Some(aiming) = aiming.filter(|_| self.is_in_air()) {
                     let choice = self.sampler.next_pair();
                     let bits = self.sampler.next_pair_bits();
-                    let scene = &self.tracer.world.scene;
-                    return aiming.onward(scene, vertex, surface, choice, bits);
+                    return aiming.onward(&self.tracer.world.scene, vertex, surface, choice, bits);
                 }
                 let lobe = if surface.bsdf().is_lambert {
                     self.sampler.skip(1);

@@ -111,8 +111,7 @@ impl World {
                 light.intensity.max_element() / (nearest * nearest)
             }
         };
-        let of_lamps = self.scene.lights.iter().map(irradiance);
-        of_lamps.fold(self.brightest(environment), f32::max)
+        self.scene.lights.iter().map(irradiance).fold(self.brightest(environment), f32::max)
     }
 
     /// Times all rays from now on, which slows them down a little.
@@ -171,8 +170,7 @@ impl World {
             if !passing.partial {
                 return self.is_covered(hit);
             }
-            let point = self.point(hit, ray.direction);
-            transmittance *= self.straight_through(&point, ray.direction);
+            transmittance *= self.straight_through(&self.point(hit, ray.direction), ray.direction);
             transmittance.max_element() <= 0.0
         });
         if blocked { Vec3::ZERO } else { transmittance }

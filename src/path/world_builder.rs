@@ -132,8 +132,7 @@ impl WorldBuilder {
         triangles: &[[u32; 3]],
     ) {
         let scene = &mut self.scene;
-        let known = scene.materials.iter().position(|m| m == material);
-        let index = known.unwrap_or_else(|| {
+        let index = scene.materials.iter().position(|m| m == material).unwrap_or_else(|| {
             scene.materials.push(material.clone());
             scene.materials.len() - 1
         });

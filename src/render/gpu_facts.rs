@@ -79,8 +79,7 @@ impl AdapterFacts {
 
     /// Whether name or backend contain `name` (in any case); everything is called nothing.
     pub(crate) fn is_called(&self, name: Option<&str>) -> bool {
-        let title = self.title().to_lowercase();
-        name.is_none_or(|name| title.contains(&name.to_lowercase()))
+        name.is_none_or(|name| self.title().to_lowercase().contains(&name.to_lowercase()))
     }
 
     /// The name without what stands in brackets.

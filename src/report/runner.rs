@@ -117,8 +117,7 @@ impl Runner<'_> {
         for seed in 0..self.context.plan.effort.seeds {
             for device in 0..self.context.devices.len() {
                 for method in 0..self.context.plan.methods.len() {
-                    let can_run = state.refusals[device].is_none();
-                    if can_run && !self.run(state, device, method, seed)? {
+                    if state.refusals[device].is_none() && !self.run(state, device, method, seed)? {
                         return Ok(false);
                     }
                 }

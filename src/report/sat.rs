@@ -59,8 +59,7 @@ fn extreme(width: u32, height: u32) -> Image {
     Image::from_fn(width, height, |x, y| {
         let uv = glam::Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
         let is_sun = direction_from_uv(uv).distance(sun) < radius;
-        let grain = 0.5 + crate::noise::unit(y * width + x);
-        [if is_sun { 1e8 } else { grain }; 3]
+        [if is_sun { 1e8 } else { 0.5 + crate::noise::unit(y * width + x) }; 3]
     })
 }
 

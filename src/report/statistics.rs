@@ -124,8 +124,7 @@ impl Bundle {
     /// is above at the end.
     pub fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
         let mean = self.mean(&self.runs());
-        let is_reached = mean.last().is_some_and(|last| *last <= error);
-        is_reached.then(|| time_to(&self.seconds, &mean, error))
+        mean.last().is_some_and(|last| *last <= error).then(|| time_to(&self.seconds, &mean, error))
     }
 
     /// Mean error and its standard error at every time.

@@ -79,8 +79,7 @@ fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);
     let view = View { width: 1, height: 1, ..view(camera, Sampling::Plain, 1) };
     let film = render(setting, (&world, &environment), view, samples)?;
-    let found = film.pixels()[0].mean()[0];
-    let off = (found / f64::from(radiance) - 1.0).abs();
+    let off = (film.pixels()[0].mean()[0] / f64::from(radiance) - 1.0).abs();
     // The map is interpolated in f32, which rounds once; a GPU keeps radiance to 2^-18 of itself,
     // and adds up to 64 samples in f32.
     let limit = if setting.gpu.is_some() { 2e-5 } else { 2e-7 };

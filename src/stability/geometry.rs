@@ -190,8 +190,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
     let view = view(camera, Sampling::Plain, 4);
     let [a, b] = [&sound, &spoilt].map(|w| render(setting, (w, &environment), view.clone(), 32));
     let (a, b) = (a?, b?);
-    let changes = luminances(&a).zip(luminances(&b)).map(|(a, b)| (a - b).abs());
-    let worst = changes.fold(0.0, f64::max);
+    let worst = luminances(&a).zip(luminances(&b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let what = "pixels' largest change by useless triangles";
     Ok(Outcome::default().sound(&b).at_most(what, worst, 0.0))
 }

@@ -85,8 +85,7 @@ fn subnormal(setting: &Setting) -> Result<Outcome> {
     if setting.gpu.is_some() {
         // WGSL allows devices to flush subnormal numbers to zero, and the map is packed to 8 bits of exponent:
         // black is correct there.
-        let environment = Environment::new(map, &EnvironmentOptions::default())?;
-        let film = floor(setting, &environment, 16)?;
+        let film = floor(setting, &Environment::new(map, &EnvironmentOptions::default())?, 16)?;
         let light = mean(&film).luminance;
         let what = "light from a map of at most 6e-39";
         return Ok(Outcome::default().sound(&film).at_most(what, light, 2e-38));

@@ -89,8 +89,7 @@ impl<'a> FloorReference<'a> {
     fn density(&self, direction: DVec3) -> f64 {
         let rgb = self.rgb(direction);
         let importance_of = |axis: Vec3| f64::from(importance(axis));
-        let importance = rgb.dot(DVec3::from([Vec3::X, Vec3::Y, Vec3::Z].map(importance_of)));
-        importance / self.energy
+        rgb.dot(DVec3::from([Vec3::X, Vec3::Y, Vec3::Z].map(importance_of))) / self.energy
     }
 }
 

@@ -169,8 +169,7 @@ fn input(gpu: &Gpu, name: &str, contents: &[u8]) -> Result<wgpu::Buffer> {
     }
     let usage = BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST;
     let buffer = gpu.make(|device| buffer(device, Some(name), size, usage))?;
-    let offsets = (0..).step_by(PIECE_BYTES);
-    for (offset, piece) in offsets.zip(contents.chunks(PIECE_BYTES)) {
+    for (offset, piece) in (0..).step_by(PIECE_BYTES).zip(contents.chunks(PIECE_BYTES)) {
         gpu.queue.write_buffer(&buffer, offset, piece);
         gpu.finish_copies()?;
     }

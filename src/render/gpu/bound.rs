@@ -31,8 +31,7 @@ impl Bound {
         let kept = self.bind_group.take().filter(|(of, _)| *of == version);
         let bind = || self.bind(gpu, buffers).map(|bind_group| (version, bind_group));
         let current = kept.map_or_else(bind, Ok)?;
-        let bind_group = self.bind_group.insert(current).1.clone();
-        Ok((self.pipeline.pipeline.clone(), bind_group))
+        Ok((self.pipeline.pipeline.clone(), self.bind_group.insert(current).1.clone()))
     }
 
     fn bind(&self, gpu: &Gpu, buffers: &Buffers) -> Result<wgpu::BindGroup> {

@@ -49,8 +49,7 @@ macro_rules! constants {
     ($($name:ident: $value:expr,)+) => {
         pub(super) fn shared() -> String {
             use $crate::render::gpu::constants::Constant as _;
-            let lines = [$(format!("const {} = {};\n", stringify!($name), $value.wgsl())),+];
-            lines.concat()
+            [$(format!("const {} = {};\n", stringify!($name), $value.wgsl())),+].concat()
         }
     };
 }

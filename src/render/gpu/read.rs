@@ -48,8 +48,7 @@ impl Gpu {
             let texels = rows.flat_map(|row| row[..4 * width as usize].chunks_exact(4));
             texels.map(|texel| [texel[0], texel[1], texel[2]]).collect()
         };
-        let pixels = self.read_staged(&staging, bytes, commands, opaque)?;
-        Ok(Rgb8 { width, height, pixels })
+        Ok(Rgb8 { width, height, pixels: self.read_staged(&staging, bytes, commands, opaque)? })
     }
 
     /// A buffer of so many bytes for [`Self::read_staged`].

@@ -353,8 +353,7 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
             Binding::Array(array)
         }
     });
-    let tree = (!features.software_walk()).then_some(Binding::Tree);
-    buffers.chain(arrays).chain(tree).collect()
+    buffers.chain(arrays).chain((!features.software_walk()).then_some(Binding::Tree)).collect()
 }
 
 /// Appends the lines of `text` whose conditions hold.

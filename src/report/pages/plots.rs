@@ -73,8 +73,7 @@ fn scientific(digit: i32, exponent: i32) -> String {
         return format!("{:.decimals$}", f64::from(digit) * 10f64.powi(exponent));
     }
     let superscript = |c: char| {
-        let digit = c.to_digit(10).and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
-        digit.unwrap_or('⁻')
+        c.to_digit(10).and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize)).unwrap_or('⁻')
     };
     let power: String = exponent.to_string().chars().map(superscript).collect();
     if digit == 1 { format!("10{power}") } else { format!("{digit}·10{power}") }
