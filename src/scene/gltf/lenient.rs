@@ -94,21 +94,23 @@ impl<'de> Visitor<'de> for Check<'_> {
             if key == "extras" || (self.of_extensions && !self.read.contains(&&*key)) {
                 object.next_value::<IgnoredAny>()?;
             } else {
-                // Keys whose whole numbers say which object of the file is meant.
-                let is_index = match &*key {
-                    "attributes" | "buffer" | "bufferView" | "camera" | "children" | "index"
-                    | "indices" | "input" | "joints" | "light" | "material" | "mesh" | "node"
-                    | "nodes" | "output" | "sampler" | "scene" | "skeleton" | "skin" | "source"
-                    | "targets" => true,
-                    "inverseBindMatrices" => true,
-                    _ => self.of_objects,
-                };
+                let is_index = self.of_objects || is_of_index(&key);
                 let of_objects = matches!(&*key, "attributes" | "targets");
                 let of_extensions = key == "extensions";
                 object.next_value_seed(Self { is_index, of_objects, of_extensions, ..self })?;
             }
         }
         Ok(())
+    }
+}
+
+/// Whether whole numbers under a key say which object of the file is meant.
+fn is_of_index(key: &str) -> bool {
+    match key {
+        "attributes" | "buffer" | "bufferView" | "camera" | "children" | "index" | "indices"
+        | "input" | "joints" | "light" | "material" | "mesh" | "node" | "nodes" | "output"
+        | "sampler" | "scene" | "skeleton" | "skin" | "source" | "targets" => true,
+        _ => key == "inverseBindMatrices",
     }
 }
 
