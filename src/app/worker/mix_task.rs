@@ -67,12 +67,11 @@ impl<'a> MixTask<'a> {
     pub(super) fn work(mut self, groups: &'a [LightGroup]) -> Arc<Request> {
         let (world, view) = (self.sessions.world, self.sessions.watch.request.view.clone());
         let may_cache = suits(world, &view);
-        let mut pictures = Vec::with_capacity(groups.len());
-        for group in groups {
-            let view = group.view(&view, pictures.len() as u32);
-            let main = Session::new(world, &group.environment, view);
-            pictures.push(GroupPicture { group, main, cached: None, turns: 0 });
-        }
+        let begin = |(number, group): (u32, &'a LightGroup)| {
+            let main = Session::new(world, &group.environment, group.view(&view, number));
+            GroupPicture { group, main, cached: None, turns: 0 }
+        };
+        let mut pictures: Vec<_> = (0..).zip(groups).map(begin).collect();
         while self.sessions.watch.takes_up_latest() {
             let activity = self.activity(&pictures);
             let shows_cached = self.sessions.watch.request.wants_cached;
@@ -81,24 +80,17 @@ impl<'a> MixTask<'a> {
                 self.publish_if_due(activity, &pictures);
                 let next = pictures.iter_mut().min_by_key(|picture| picture.samples(shows_cached));
                 next.into_iter().for_each(|picture| self.advance(picture, may_cache));
-            } else if self.settle(&mut pictures) {
+                continue;
+            }
+            // All of them, whether or not a GPU has failed with one.
+            let settle = |picture: &mut GroupPicture<'_>| self.sessions.settle(&mut picture.main);
+            if pictures.iter_mut().map(settle).filter(|is_settled| !is_settled).count() == 0 {
                 self.publish(activity, &pictures);
                 self.sessions.device.note_compiled();
                 self.sessions.rest();
             }
         }
         self.sessions.watch.request
-    }
-
-    /// Waits for what a GPU is still at work on; whether none has failed.
-    fn settle(&mut self, pictures: &mut [GroupPicture<'_>]) -> bool {
-        let mut is_settled = true;
-        for picture in pictures {
-            let settled = picture.main.settle();
-            is_settled &= settled.is_ok();
-            self.sessions.go_on(&mut picture.main, settled);
-        }
-        is_settled
     }
 
     /// What is to be done next.

@@ -10,7 +10,7 @@ use super::session_cache::SessionCache;
 use super::shared::{Preparation, RequestWatch};
 use crate::alarm::Alarm;
 use crate::environment::Environment;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::light_grid::LearningGrid;
 use crate::path::World;
 use crate::render::gpu::CompileGuard;
@@ -64,12 +64,9 @@ impl<'a> Sessions<'a> {
     ) -> (Session<'a>, Option<Arc<LearningGrid>>) {
         let mut session = self.new_session(view);
         let counted = self.kept.counted_for(&self.watch.request);
-        let counted = counted.filter(|counted| match session.continue_learning(counted) {
-            Ok(is_gone_on_from) => is_gone_on_from,
-            Err(failure) => {
-                self.go_on(&mut session, Err(failure));
-                false
-            }
+        let counted = counted.filter(|counted| {
+            let is_gone_on_from = session.continue_learning(counted);
+            self.go_on(&mut session, is_gone_on_from) == Some(true)
         });
         (session, counted)
     }
@@ -79,9 +76,8 @@ impl<'a> Sessions<'a> {
         let mut session = self.new_session(view);
         session.finish_learning();
         let is_learning_mode = session.view().distribution_options().is_some();
-        if let Some(distributions) =
-            self.kept.distributions_for(&self.watch.request).filter(|_| is_learning_mode)
-        {
+        let distributions = self.kept.distributions_for(&self.watch.request);
+        if let Some(distributions) = distributions.filter(|_| is_learning_mode) {
             let given = session.set_grid((*distributions).clone());
             self.go_on(&mut session, given);
         }
@@ -129,8 +125,7 @@ impl<'a> Sessions<'a> {
     pub(super) fn rest(&self) -> bool {
         let Self { watch, device, .. } = self;
         watch.shared.orders.wait(|slot| {
-            let is_other = slot.value.as_ref().is_none_or(|new| !watch.request.is_same(new));
-            if slot.is_closed || is_other {
+            if slot.is_closed || slot.value.as_ref().is_none_or(|new| !watch.request.is_same(new)) {
                 ControlFlow::Break(false)
             } else if device.was_compiling() && !device.is_compiling() {
                 ControlFlow::Break(true)
@@ -192,12 +187,11 @@ impl<'a> Sessions<'a> {
             return true;
         }
         self.device.choose_for(&self.watch.request);
-        let needs_upload = self.device.needs_upload(&self.watch.request);
-        let uploading = needs_upload.then(|| Preparation::begin(self.watch.shared));
-        if needs_upload {
+        let uploading = self.device.needs_upload(&self.watch.request).then(|| {
             // With another one or another scene it was different.
             self.kept.seconds_per_path[1] = None;
-        }
+            Preparation::begin(self.watch.shared)
+        });
         self.place_if_compiled(session);
         drop(uploading);
         // Pictures that are compared, or are to be repeatable, come from one device.
@@ -221,13 +215,20 @@ impl<'a> Sessions<'a> {
         self.report_failure();
     }
 
-    /// Goes on where it can if a GPU has failed.
-    pub(super) fn go_on(&mut self, session: &mut Session<'_>, outcome: Result<()>) {
-        if let Err(failure) = outcome {
+    /// Waits for what a GPU is still at work on; whether none has failed.
+    pub(super) fn settle(&mut self, session: &mut Session<'_>) -> bool {
+        let settled = session.settle();
+        self.go_on(session, settled).is_some()
+    }
+
+    /// Goes on where it can if a GPU has failed, without what it was to give.
+    pub(super) fn go_on<T>(&mut self, session: &mut Session<'_>, outcome: Result<T>) -> Option<T> {
+        let give_up = |failure: &Error| {
             session.continue_on_cpu();
-            self.device.give_up(&failure, &self.watch.request);
+            self.device.give_up(failure, &self.watch.request);
             self.report_failure();
-        }
+        };
+        outcome.inspect_err(give_up).ok()
     }
 
     fn report_failure(&mut self) {
