@@ -21,6 +21,9 @@ const PUBLISH_SHARE: u32 = 40;
 /// But a picture that changes is shown at least so often.
 pub(super) const MAX_GAP: Duration = Duration::from_millis(800);
 
+/// Where a film is shown in place: the window's device, and the film on it.
+pub(super) type InPlace = (Gpu, DeviceFilm);
+
 /// Films by the session they are of.
 pub(super) const MAIN: usize = 0;
 pub(super) const PLAIN: usize = 1;
@@ -44,21 +47,15 @@ pub(super) struct Preview {
 pub(super) struct FilmCopy {
     session: SessionSnapshot,
     /// Where the film is shown in place meanwhile.
-    of: Option<(Gpu, DeviceFilm)>,
+    of: Option<InPlace>,
     at: Instant,
     /// Age at which it is too old, where it is shown in place.
     gap: Duration,
 }
 
 impl Preview {
-    /// Decides before a picture is published whether new copies are wanted, which are not where `is_throttled`. A
-    /// picture that `is_final` is always copied.
-    pub(super) fn prepare(&mut self, is_final: bool, is_throttled: bool) {
-        self.rests = !is_final && (is_throttled || self.is_ahead());
-    }
-
     /// Whether those who show films have one that they have not come to yet: a third would only take memory.
-    fn is_ahead(&mut self) -> bool {
+    pub(super) fn is_ahead(&mut self) -> bool {
         self.lent.retain(|film| film.strong_count() > 0);
         let copies = || self.copies.iter().flatten();
         let is_fresh = |copy: &FilmCopy| copy.at.elapsed() < MAX_COPY_AGE;
@@ -66,7 +63,7 @@ impl Preview {
     }
 
     /// Whether the last copy of a session's film does not serve on, by its age where it is shown `in_place`.
-    fn is_stale(&self, role: usize, in_place: Option<&(Gpu, DeviceFilm)>, rests: bool) -> bool {
+    pub(super) fn is_stale(&self, role: usize, in_place: Option<&InPlace>, rests: bool) -> bool {
         let serves = |copy: &FilmCopy| match (&copy.of, in_place) {
             (Some((gpu, film)), Some((on, of))) => {
                 gpu.is_same(on) && film == of && copy.at.elapsed() < copy.gap
@@ -78,21 +75,12 @@ impl Preview {
         !self.copies[role].as_ref().is_some_and(serves)
     }
 
-    /// Whether figures that need the main film are to be taken anew.
-    pub(super) fn is_reading_due(
-        &self,
-        session: &Session<'_>,
-        in_place: Option<&(Gpu, DeviceFilm)>,
-    ) -> bool {
-        session.samples() > 0 && self.is_stale(MAIN, in_place, false)
-    }
-
     /// A session's picture, and what reading a film that is shown `in_place` took of the time.
     pub(super) fn session_snapshot(
         &mut self,
         role: usize,
         session: &Session<'_>,
-        in_place: Option<(Gpu, DeviceFilm)>,
+        in_place: Option<InPlace>,
         is_final: bool,
     ) -> (SessionSnapshot, Duration) {
         let (is_in_place, mut cost) = (in_place.is_some(), Duration::ZERO);
@@ -103,34 +91,32 @@ impl Preview {
             let is_unseen = !is_in_place && !session.is_begun();
             is_awaited || !is_unseen && self.is_stale(role, in_place.as_ref(), self.rests)
         });
-        let copy = match self.copies[role].take().filter(|_| !is_due) {
-            Some(copy) => copy,
-            None => {
-                let start = Instant::now();
-                let film = Arc::new(session.film().clone());
-                if session.figures().samples > 0 {
-                    self.lent.push(Arc::downgrade(&film));
-                }
-                let session = SessionSnapshot {
-                    sampling: session.view().sampling,
-                    samples: session.samples(),
-                    noise: session.noise(),
-                    figures: session.figures(),
-                    comparable_seconds: session.comparable_seconds(),
-                    invalid_samples: film.invalid_samples(),
-                    film,
-                    grid: None,
-                    gpu: None,
-                    on_device: None,
-                };
-                if is_in_place {
-                    cost = start.elapsed();
-                }
-                let gap = gap_after(cost).max(READING_GAP);
-                FilmCopy { session, of: in_place, at: Instant::now(), gap }
+        self.copies[role].take_if(|_| is_due);
+        let copy = self.copies[role].get_or_insert_with(|| {
+            let start = Instant::now();
+            let film = Arc::new(session.film().clone());
+            if session.figures().samples > 0 {
+                self.lent.push(Arc::downgrade(&film));
             }
-        };
-        let mut snapshot = self.copies[role].insert(copy).session.clone();
+            let session = SessionSnapshot {
+                sampling: session.view().sampling,
+                samples: session.samples(),
+                noise: session.noise(),
+                figures: session.figures(),
+                comparable_seconds: session.comparable_seconds(),
+                invalid_samples: film.invalid_samples(),
+                film,
+                grid: None,
+                gpu: None,
+                on_device: None,
+            };
+            if is_in_place {
+                cost = start.elapsed();
+            }
+            let gap = gap_after(cost).max(READING_GAP);
+            FilmCopy { session, of: in_place, at: Instant::now(), gap }
+        });
+        let mut snapshot = copy.session.clone();
         if is_in_place {
             // That is what is shown.
             snapshot.samples = session.samples();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::inspection::Inspection;
-use super::preview::{MAIN, MAX_GAP, PLAIN, Preview, gap_after};
+use super::preview::{InPlace, MAIN, MAX_GAP, PLAIN, Preview, gap_after};
 use super::request::Request;
 use super::session_cache::{Learned, SuspendedPicture};
 use super::sessions::Sessions;
@@ -12,7 +12,6 @@ use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
 use crate::light_grid::LearningGrid;
 use crate::render::cached_picture::{CachedPicture, suits, view};
-use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 
 /// While there is much to learn the picture goes on a little this often.
@@ -181,25 +180,19 @@ impl<'a> PictureTask<'a> {
             self.inspection.curves[MAIN] = left.curve;
             let lit = (self.sessions.world, self.sessions.environment);
             let resume = |state| Session::resume(lit, state);
-            let cached = left.cached.map(|cached| {
-                let mut cached = cached.map(resume);
-                self.sessions.take_up_training(&mut cached.session);
-                cached
-            });
+            let mut cached = left.cached.map(|cached| cached.map(resume));
+            cached.iter_mut().for_each(|it| self.sessions.take_up_training(&mut it.session));
             let pictures = Pictures::new(resume(left.session), cached);
             // Before it goes on.
             self.publish(Activity::Rendering, &pictures);
             return pictures;
         }
         let view = request.view.clone();
-        let main = if request.is_frozen && self.sessions.kept.distributions_for(&request).is_some()
-        {
-            self.sessions.experienced_session(view)
-        } else {
-            let (session, counted) = self.sessions.learning_session(view);
-            self.counters = counted;
-            session
-        };
+        if request.is_frozen && self.sessions.kept.distributions_for(&request).is_some() {
+            return Pictures::new(self.sessions.experienced_session(view), None);
+        }
+        let (main, counted) = self.sessions.learning_session(view);
+        self.counters = counted;
         Pictures::new(main, None)
     }
 
@@ -226,13 +219,8 @@ impl<'a> PictureTask<'a> {
 
     /// Publishes a picture that is paused or done, and waits until something else is asked for or possible.
     fn stand_still(&mut self, activity: Activity, pictures: &mut Pictures<'_>) {
-        if activity == Activity::Done {
-            let settled = pictures.main.settle();
-            let has_failed = settled.is_err();
-            self.sessions.go_on(&mut pictures.main, settled);
-            if has_failed {
-                return;
-            }
+        if activity == Activity::Done && !self.sessions.settle(&mut pictures.main) {
+            return;
         }
         // With an error, if something to measure it by has come.
         self.note(pictures);
@@ -281,7 +269,7 @@ impl<'a> PictureTask<'a> {
             return;
         }
         let is_plain_next = pictures.plain.is_some() && !pictures.are_level(&rule);
-        let wants_cached = self.request().wants_cached;
+        let (wants_cached, cut) = (self.request().wants_cached, self.request().previews);
         let Pictures { main, plain, cached, turns } = pictures;
         let cached = cached.as_mut().filter(|_| wants_cached);
         if let Some(plain) = plain.as_mut().filter(|_| is_plain_next) {
@@ -291,14 +279,12 @@ impl<'a> PictureTask<'a> {
         {
             let start = Instant::now();
             // Where it is shown no GPU is quicker, and one that is being made ready will show none.
-            let cut = self.request().previews;
             self.sessions.advance_in_place(cached, None, cut);
             self.cached_seconds += start.elapsed().as_secs_f64();
             *turns += 1;
         } else {
             *turns = 0;
             let distribution_paths = main.figures().distribution_paths;
-            let cut = self.request().previews;
             self.sessions.advance(main, Some(rule), cut);
             self.sessions.measure(main);
             if main.figures().distribution_paths > distribution_paths {
@@ -394,8 +380,9 @@ impl<'a> PictureTask<'a> {
     fn publish_if_due(&mut self, activity: Activity, pictures: &Pictures<'_>) {
         let is_due = self.published.elapsed() >= self.publish_gap;
         let in_place = self.in_place(&pictures.main);
-        let is_reading_due =
-            is_due && self.preview.is_reading_due(&pictures.main, in_place.as_ref());
+        // Figures that need the main film are taken anew with it.
+        let is_stale = self.preview.is_stale(MAIN, in_place.as_ref(), false);
+        let is_reading_due = is_due && pictures.main.samples() > 0 && is_stale;
         let previews = self.request().previews;
         if is_due && previews && !self.sessions.watch.is_superseded() {
             let now = Some((activity, pictures.progress()));
@@ -415,7 +402,8 @@ impl<'a> PictureTask<'a> {
         let (shared, request) = (self.sessions.watch.shared, Arc::clone(self.request()));
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
         let Pictures { main, plain, cached, .. } = pictures;
-        self.preview.prepare(is_final, shared.throttle.lasts(MAX_GAP));
+        self.preview.rests =
+            !is_final && (shared.throttle.lasts(MAX_GAP) || self.preview.is_ahead());
         let (main_snapshot, mut reading) = self.session_snapshot(MAIN, main, is_final);
         let plain = plain.as_ref().map(|plain| {
             let (snapshot, cost) = self.session_snapshot(PLAIN, plain, is_final);
@@ -448,8 +436,7 @@ impl<'a> PictureTask<'a> {
         });
         self.published = Instant::now();
         if !self.preview.rests {
-            let cost = (self.published - start).saturating_sub(reading);
-            self.publish_gap = gap_after(cost);
+            self.publish_gap = gap_after((self.published - start).saturating_sub(reading));
         }
     }
 
@@ -467,7 +454,7 @@ impl<'a> PictureTask<'a> {
 
     /// The session's film if the window shows it in every frame without its being read. Small ones are
     /// filtered on the CPU, and software does not draw so often.
-    fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
+    fn in_place(&self, session: &Session<'_>) -> Option<InPlace> {
         let (gpu, film) = session.film_on_device()?;
         let is_small = film.width < self.request().view.width;
         let screen = &self.sessions.watch.shared.screen;
