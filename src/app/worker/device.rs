@@ -12,9 +12,8 @@ use crate::render::{Session, View};
 
 /// The device in use and what is on it.
 pub(super) struct Device {
-    /// Name of the adapter to take, if one was asked for.
-    adapter: Option<String>,
-    rays: RayChoice,
+    /// Name of the adapter to take, if one was asked for, and what finds surfaces there.
+    asked: (Option<String>, RayChoice),
     /// The device the window is drawn on, to be shared if it is of that adapter.
     screen: Arc<Mutex<Gpu>>,
     choice: Option<DeviceChoice>,
@@ -40,21 +39,10 @@ struct Awaited {
 }
 
 impl Device {
-    pub(super) fn new(
-        (adapter, rays): (Option<String>, RayChoice),
-        screen: Arc<Mutex<Gpu>>,
-    ) -> Self {
-        Self {
-            adapter,
-            rays,
-            screen,
-            choice: None,
-            gpu: None,
-            uploaded: None,
-            awaited: None,
-            failure: None,
-            refused: None,
-        }
+    pub(super) fn new(asked: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
+        let (choice, gpu, uploaded, awaited) = (None, None, None, None);
+        let (failure, refused) = (None, None);
+        Self { asked, screen, choice, gpu, uploaded, awaited, failure, refused }
     }
 
     /// Chooses the device that the request names, which may be none but the CPU. A GPU that failed with
@@ -62,20 +50,29 @@ impl Device {
     pub(super) fn choose_for(&mut self, request: &Request) {
         let geometry = Arc::downgrade(&request.world.geometry);
         let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.ptr_eq(&geometry));
+        let choice = request.device;
+        let is_new = self.choice.replace(choice) != Some(choice);
         // A real one is what both choices of a GPU mean.
-        let is_meant = request.device != DeviceChoice::Cpu && self.has_real_gpu();
-        if is_meant {
-            self.choice = Some(request.device);
-        } else if self.choice != Some(request.device) || failed_with_another {
-            self.choose(request.device);
+        let is_meant = choice != DeviceChoice::Cpu && self.has_real_gpu();
+        if is_meant || !(is_new || failed_with_another) {
+            return;
+        }
+        (self.gpu, self.uploaded, self.awaited, self.refused) = (None, None, None, None);
+        // The name only says which GPU is meant.
+        let (adapter, rays) = &self.asked;
+        let adapter = adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
+        let screen = lock(&self.screen).clone();
+        let opened = choice.open_or_share(adapter, Some(&screen));
+        match opened.and_then(|gpu| gpu.map(|gpu| gpu.with_rays(*rays)).transpose()) {
+            Ok(gpu) => self.gpu = gpu,
+            Err(failure) => self.tell(&failure),
         }
     }
 
     /// Whether a GPU was chosen to which the scene has to be uploaded.
     pub(super) fn needs_upload(&self, request: &Request) -> bool {
-        let is_uploaded =
-            self.uploaded.as_ref().is_some_and(|(on, _)| Arc::ptr_eq(on, &request.world));
-        self.gpu.is_some() && !is_uploaded
+        let uploaded = self.uploaded.as_ref().map(|(world, _)| Arc::as_ptr(world));
+        self.gpu.is_some() && uploaded != Some(Arc::as_ptr(&request.world))
     }
 
     /// Whether a GPU is ready that has all first samples in a moment; software has not.
@@ -113,16 +110,12 @@ impl Device {
         (request, environment): (&Request, &Environment),
         preparation: impl FnOnce() -> Arc<CompileGuard>,
     ) {
-        let Some(gpu) = self.gpu.clone() else {
-            session.continue_on_cpu();
-            return;
-        };
+        let Some(gpu) = self.gpu.clone() else { return session.continue_on_cpu() };
         if session.is_on_gpu() || self.awaits(session, request, environment) {
             return;
         }
         let uploaded = self.upload(&gpu, request, environment);
-        let placed = uploaded.and_then(|on| session.continue_on_gpu_if_compiled(on, preparation));
-        match placed {
+        match uploaded.and_then(|on| session.continue_on_gpu_if_compiled(on, preparation)) {
             Ok(held) => {
                 self.awaited = held.map(|held| Awaited {
                     world: Arc::downgrade(&request.world),
@@ -154,19 +147,6 @@ impl Device {
 
     fn tell(&mut self, failure: &Error) {
         self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
-    }
-
-    fn choose(&mut self, choice: DeviceChoice) {
-        self.choice = Some(choice);
-        (self.gpu, self.uploaded, self.awaited, self.refused) = (None, None, None, None);
-        // The name only says which GPU is meant.
-        let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
-        let screen = lock(&self.screen).clone();
-        let opened = choice.open_or_share(adapter, Some(&screen));
-        match opened.and_then(|gpu| gpu.map(|gpu| gpu.with_rays(self.rays)).transpose()) {
-            Ok(gpu) => self.gpu = gpu,
-            Err(failure) => self.tell(&failure),
-        }
     }
 
     /// The request's scene and a map on the GPU; what is there already is not uploaded again.

@@ -104,10 +104,8 @@ impl Worker {
 
     /// Whether a picture is of what was asked for last, whatever else is wanted with it.
     pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
-        let is_of = |latest: &Request| {
-            !snapshot.request.restarts(latest) && snapshot.request.mix == latest.mix
-        };
-        self.latest().is_some_and(|latest| is_of(&latest))
+        let request = &snapshot.request;
+        self.latest().is_some_and(|latest| !request.restarts(&latest) && request.mix == latest.mix)
     }
 
     /// Whether a GPU is being opened, filled or programmed.
@@ -148,8 +146,7 @@ impl Drop for Worker {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
-    let device = || Device::new(gpu.clone(), Arc::clone(&shared.screen));
-    let fresh = || (device(), SessionCache::default());
+    let fresh = || (Device::new(gpu.clone(), Arc::clone(&shared.screen)), SessionCache::default());
     let (mut device, mut kept) = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
