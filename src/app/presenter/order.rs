@@ -40,15 +40,12 @@ pub(crate) struct Order {
 
 impl PartialEq for Order {
     fn eq(&self, other: &Self) -> bool {
+        let ahead = |of: &Self| of.ahead.as_ref().map(Arc::as_ptr);
+        let settings = |of: &Self| (of.denoiser, of.metered, of.overlay, of.look, of.tile, of.sun);
         Arc::ptr_eq(&self.developer, &other.developer)
             && self.snapshot.number == other.snapshot.number
-            && self.ahead.as_ref().map(Arc::as_ptr) == other.ahead.as_ref().map(Arc::as_ptr)
-            && self.denoiser == other.denoiser
-            && self.metered == other.metered
-            && self.overlay == other.overlay
-            && self.look == other.look
-            && self.tile == other.tile
-            && self.sun == other.sun
+            && ahead(self) == ahead(other)
+            && settings(self) == settings(other)
             && self.compared == other.compared
     }
 }
@@ -57,9 +54,7 @@ impl Order {
     /// It once its picture is made: the film beside the picture's own is large, and serves no more.
     pub(super) fn presented(&self) -> Self {
         let mut snapshot = (*self.snapshot).clone();
-        if let Some(backdrop) = &mut snapshot.backdrop {
-            backdrop.film = Arc::default();
-        }
+        snapshot.backdrop.iter_mut().for_each(|backdrop| backdrop.film = Arc::default());
         snapshot.groups = Arc::default();
         Self { snapshot: Arc::new(snapshot), ..self.clone() }
     }

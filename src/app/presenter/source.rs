@@ -98,13 +98,9 @@ impl Source {
     pub(super) fn key(&self) -> SourceKey {
         let same = |film: &Arc<Film>| Same(Arc::downgrade(film));
         let of_backdrop = |it: &Backdrop| (same(&it.film), it.worth);
-        SourceKey {
-            film: same(&self.session.film),
-            backdrop: self.backdrop.as_ref().map(of_backdrop),
-            denoiser: self.denoiser,
-            is_whole: self.is_whole,
-            coarseness: self.coarseness,
-        }
+        let (film, backdrop) = (same(&self.session.film), self.backdrop.as_ref().map(of_backdrop));
+        let Self { denoiser, is_whole, coarseness, .. } = *self;
+        SourceKey { film, backdrop, denoiser, is_whole, coarseness }
     }
 
     /// Whether nothing that it is made from has light enough for an exposure; a film on the device is not

@@ -50,10 +50,9 @@ impl Request {
         !Arc::ptr_eq(&self.world, &new.world)
             || !Arc::ptr_eq(&self.environment, &new.environment)
             || self.view != new.view
-            || self.moving != new.moving
+            || (self.moving, self.run) != (new.moving, new.run)
             || self.mix.is_some() != new.mix.is_some()
             || self.moving && self.mix != new.mix
-            || self.run != new.run
     }
 
     /// Whether the very same picture is rendered for both. Its map may have been turned back meanwhile, or read again.
@@ -115,16 +114,13 @@ impl Request {
     }
 
     pub(super) fn is_same(&self, new: &Self) -> bool {
+        let wants =
+            |of: &Self| (of.split, of.wants_cached, of.inspects_cache, of.paused, of.device);
+        let reference = |of: &Self| of.reference.as_ref().map(Arc::as_ptr);
         !self.restarts(new)
-            && self.split == new.split
-            && self.device == new.device
-            && self.is_frozen == new.is_frozen
-            && self.wants_cached == new.wants_cached
-            && self.inspects_cache == new.inspects_cache
-            && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
-            && self.rule == new.rule
-            && self.mix == new.mix
-            && self.paused == new.paused
+            && wants(self) == wants(new)
+            && reference(self) == reference(new)
+            && (self.is_frozen, self.rule, &self.mix) == (new.is_frozen, new.rule, &new.mix)
     }
 }
 

@@ -118,9 +118,7 @@ impl SessionCache {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });
         }
         self.learned.take_if(|learned| !learned.world.has_same_visibility(world));
-        if let Some(learned) = &mut self.learned {
-            learned.world = Arc::clone(world);
-        }
+        self.learned.iter_mut().for_each(|learned| learned.world = Arc::clone(world));
     }
 
     /// A map of factors 1 as those of a mix make it.
@@ -165,13 +163,12 @@ impl SessionCache {
     /// Distributions for this request from the last ones, if they are of the same scene.
     pub(super) fn distributions_for(&self, request: &Request) -> Option<Arc<LightGrid>> {
         let Learned { grid: distributions, environment: map, .. } = self.learned_in(request)?;
-        let same = map.tile_energies() == request.environment.tile_energies()
-            && map.direction_in_tile(0, glam::Vec2::ZERO)
-                == request.environment.direction_in_tile(0, glam::Vec2::ZERO);
-        if same {
+        let now = &request.environment;
+        let first = |map: &Environment| map.direction_in_tile(0, glam::Vec2::ZERO);
+        if map.tile_energies() == now.tile_energies() && first(map) == first(now) {
             return Some(Arc::clone(distributions));
         }
-        distributions.transferred(map, &request.environment).map(Arc::new)
+        distributions.transferred(map, now).map(Arc::new)
     }
 
     /// What was counted in this scene with this light.
