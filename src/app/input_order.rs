@@ -12,30 +12,24 @@ use super::commands::{Command, requested};
 /// that was pressed in it, and nothing typed after Enter, which ends what is typed, or after a shortcut that asks for a
 /// path, which begins it. The rest is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
-    let is_press = |event: &&Event| {
-        matches!(
-            event,
-            Event::Key { pressed: true, .. } | Event::PointerButton { pressed: true, .. }
-        )
+    let is_key = |event: &Event| matches!(event, Event::Key { pressed: true, .. });
+    let is_button = |event: &Event, is_down: bool| match event {
+        Event::PointerButton { pressed, .. } => *pressed == is_down,
+        _ => false,
     };
+    let is_press = |event: &&Event| is_key(event) || is_button(event, true);
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
     let (mut is_down, mut is_over) = (false, false);
     let ends = |event: &Event| {
-        let is_button =
-            |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
-        is_down |= is_button(true);
-        let is_typing = matches!(
-            event,
-            Event::Text(_) | Event::Paste(_) | Event::Ime(_) | Event::Key { pressed: true, .. }
-        );
-        let is_of_another = is_typing && is_over;
+        is_down |= is_button(event, true);
+        let is_text = matches!(event, Event::Text(_) | Event::Paste(_) | Event::Ime(_));
+        let is_of_another = is_over && (is_text || is_key(event));
         let is_enter = matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
         is_over |= is_enter || matches!(requested(event), Some(Command::Ask(_)));
-        is_other(event) || (is_down && is_button(false)) || is_of_another
+        is_other(event) || (is_down && is_button(event, false)) || is_of_another
     };
-    let end = events.iter().position(ends).unwrap_or(events.len());
-    events.split_off(end)
+    events.split_off(events.iter().position(ends).unwrap_or(events.len()))
 }
 
 #[cfg(test)]

@@ -15,6 +15,13 @@ const LEARNED_WELL: f32 = 0.3;
 const NAMES: [&str; 5] =
     ["Seen directly", "Map, direct", "Lamps, direct", "Map, reflected", "Lamps, reflected"];
 
+/// Columns of the table, and what they say.
+const COLUMNS: [(&str, &str); 3] = [
+    ("Light", "How it comes to this pixel"),
+    ("Share", "Of the pixel's luminance"),
+    ("Noise", "Its share of the variance of exact samples; negative where it balances others"),
+];
+
 /// Draws the table of parts, and the advice. `misplaced` is the share of the learned probability that lies where the
 /// truth has none; `None` where nothing was learned.
 pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
@@ -22,28 +29,17 @@ pub(super) fn show(ui: &mut Ui, truth: &Truth, misplaced: Option<f32>) {
     let light: f64 = parts.luminance.iter().sum();
     if light > 0.0 {
         Grid::new("light").num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
-            for (name, hint) in [
-                ("Light", "How it comes to this pixel"),
-                ("Share", "Of the pixel's luminance"),
-                (
-                    "Noise",
-                    "Its share of the variance of exact samples; negative where it balances others",
-                ),
-            ] {
+            for (name, hint) in COLUMNS {
                 ui.label(theme::quiet(name)).on_hover_text(hint);
             }
             ui.end_row();
-            for ((name, luminance), noise) in
-                NAMES.into_iter().zip(parts.luminance).zip(parts.noise)
-            {
-                if luminance > 0.0 {
-                    let shares =
-                        [luminance / light, noise].map(|share| format!("{:.0} %", 100.0 * share));
-                    for text in [name].into_iter().chain(shares.iter().map(String::as_str)) {
-                        ui.label(RichText::new(text).size(12.5));
-                    }
-                    ui.end_row();
+            let lines = NAMES.into_iter().zip(parts.luminance).zip(parts.noise);
+            for ((name, luminance), noise) in lines.filter(|((_, luminance), _)| *luminance > 0.0) {
+                let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+                for text in [name.to_owned(), percent(luminance / light), percent(noise)] {
+                    ui.label(RichText::new(text).size(12.5));
                 }
+                ui.end_row();
             }
         });
     }
@@ -64,8 +60,7 @@ fn sentences(parts: &LightParts, unblocked: f32, misplaced: Option<f32>) -> Vec<
     let samples = (parts.spread / LITTLE_NOISE).powi(2).ceil().max(1.0) as u64;
     let (count, percent) = (theme::count(samples), 100.0 * LITTLE_NOISE);
     let noise = format!("This pixel takes {count} samples until its noise is {percent:.0} %.");
-    let noises = LightPart::ALL.into_iter().zip(parts.noise);
-    let noisiest = noises.max_by(|a, b| a.1.total_cmp(&b.1));
+    let noisiest = LightPart::ALL.into_iter().zip(parts.noise).max_by(|a, b| a.1.total_cmp(&b.1));
     let (noisiest, _) = noisiest.unwrap_or((LightPart::Seen, 0.0));
     let help = match (noisiest, misplaced) {
         _ if samples <= 4 => return vec![arriving, noise],

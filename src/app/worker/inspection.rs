@@ -47,17 +47,14 @@ impl Inspection {
             return Err(NoCache::Unasked);
         }
         let before = kept.training.as_ref().filter(|_| kept.has_training_for(request));
-        let missing = if request.view.limits.bounces < 2 {
-            NoCache::OneBounce
-        } else if !request.wants_cached {
-            NoCache::NotDenoised
-        } else if request.split {
-            NoCache::Split
-        } else if is_quick {
-            NoCache::QuickDevice
-        } else {
-            NoCache::Untrained
-        };
+        let causes = [
+            (request.view.limits.bounces < 2, NoCache::OneBounce),
+            (!request.wants_cached, NoCache::NotDenoised),
+            (request.split, NoCache::Split),
+            (is_quick, NoCache::QuickDevice),
+        ];
+        let cause = causes.into_iter().find(|(is_it, _)| *is_it);
+        let missing = cause.map_or(NoCache::Untrained, |(_, missing)| missing);
         let training = session.training().or(before.map(|(training, _)| training));
         let training = training.ok_or(missing)?;
         let state = training.state();
