@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::comparison::Comparison;
-use super::document::Document;
+use super::document::{Document, Look};
 use super::overlays::Overlay;
 use super::presenter::{Order, Presenter, Shown};
 use super::screen::{Developed, Screen};
@@ -114,19 +114,15 @@ impl Display {
 
     /// How the picture is developed under overlays of this opacity, once the exposure is known.
     pub(super) fn settings(&self, document: &Document, opacity: f32) -> Option<DevelopSettings> {
-        let look = &document.look;
+        let Look { white_balance, curve, .. } = document.look;
         let opacity = match self.shown.as_ref().and_then(|shown| shown.order.overlay) {
             Some(overlay) if overlay.is_opaque() => [1.0, 0.6],
             Some(Overlay::Sun) => [0.6 * opacity, 0.0],
             // What the overlay does not speak of steps back.
             _ => [opacity, 0.6 * opacity],
         };
-        Some(DevelopSettings {
-            white_balance: look.white_balance,
-            exposure_ev: self.exposure_ev(document)?,
-            curve: look.curve,
-            opacity,
-        })
+        let exposure_ev = self.exposure_ev(document)?;
+        Some(DevelopSettings { white_balance, exposure_ev, curve, opacity })
     }
 
     /// The picture as it is on the screen, overlay included, if there is one.

@@ -71,14 +71,14 @@ impl Settings {
     /// data; `None` if there is none.
     pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(DATA)?.join("pictures"));
-        file.map(|file| beside(file, ".pictures")).or_else(usual)
+        file.map(|file| file.with_added_extension("pictures")).or_else(usual)
     }
 
     /// Where small pictures of maps are: beside a settings file that was named, else under the user's folder for
     /// what can be made again; `None` if there is none.
     pub fn small_maps_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder(CACHE)?.join("maps"));
-        file.map(|file| beside(file, ".maps")).or_else(usual)
+        file.map(|file| file.with_added_extension("maps")).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -86,15 +86,13 @@ impl Settings {
     /// # Errors
     /// If the file is there but cannot be read or understood.
     pub fn read(path: &Path) -> Result<Self> {
+        let understood = |bytes: Vec<u8>| {
+            let settings = serde_json::from_slice(&bytes).map(Self::within_bounds);
+            settings.map_err(|e| format!("settings not understood: {e}"))
+        };
         match std::fs::metadata(path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
-            _ => read_file(path)
-                .and_then(|bytes| {
-                    serde_json::from_slice(&bytes)
-                        .map(Self::within_bounds)
-                        .map_err(|e| format!("settings not understood: {e}"))
-                })
-                .at(path),
+            _ => read_file(path).and_then(understood).at(path),
         }
     }
 
@@ -105,7 +103,7 @@ impl Settings {
             Ok(settings) => return (settings, None),
             Err(failure) => failure,
         };
-        let aside = beside(path, ".bak");
+        let aside = path.with_added_extension("bak");
         let notice = match std::fs::copy(path, &aside) {
             Ok(_) => format!("{failure}; it is kept as {}", aside.display()),
             Err(error) => format!("{failure}; it cannot be kept aside: {error}"),
@@ -122,13 +120,10 @@ impl Settings {
     /// Values a window can work with: a file that was edited or damaged may hold anything.
     fn within_bounds(mut self) -> Self {
         let default = Self::default();
+        let is_possible = |pixels: u64| (1..=View::MAX_PIXELS).contains(&pixels);
         self.size = match self.size {
             PictureSize::Viewport(divisor) => PictureSize::Viewport(divisor.clamp(1, 64)),
-            PictureSize::Fixed(width, height)
-                if (1..=View::MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) =>
-            {
-                self.size
-            }
+            PictureSize::Fixed(w, h) if is_possible(u64::from(w) * u64::from(h)) => self.size,
             PictureSize::Fixed(..) => default.size,
         };
         for (side, usual) in self.window_size.iter_mut().zip(default.window_size) {
@@ -163,13 +158,8 @@ impl Settings {
 
     /// The document a new window starts from.
     pub fn document(&self) -> Document {
-        Document {
-            look: self.look,
-            light: self.light,
-            size: self.size,
-            stop: self.stop,
-            ..Document::default()
-        }
+        let Self { look, light, size, stop, .. } = *self;
+        Document { look, light, size, stop, ..Document::default() }
     }
 
     /// Takes over what was changed in a window since it was opened with `start`: what the command line
@@ -340,13 +330,6 @@ fn put_first(list: &mut Vec<String>, name: &str) {
     list.retain(|other| other != name);
     list.insert(0, name.to_owned());
     list.truncate(MAX_RECENT);
-}
-
-/// What lies beside a file: its name with an ending.
-fn beside(file: &Path, ending: &str) -> PathBuf {
-    let mut path = file.as_os_str().to_owned();
-    path.push(ending);
-    path.into()
 }
 
 #[cfg(test)]
