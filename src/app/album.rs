@@ -52,9 +52,8 @@ impl Album {
             .spawn(move || {
                 let (found, failure) = read_all(&place);
                 report(Ok(found));
-                let failures = failure.into_iter();
-                let failures = failures.chain(orders.into_iter().filter_map(|job| job().err()));
-                failures.for_each(|error| report(Err(error)));
+                let later = orders.into_iter().filter_map(|job| job().err());
+                failure.into_iter().chain(later).for_each(|error| report(Err(error)));
             })
             .map_err(|error| Error::new(format!("no thread for kept pictures: {error}")))?;
         Ok(Self { folder, jobs, _thread: Joined(Some(thread)), written: 0 })
@@ -120,25 +119,16 @@ impl Album {
 
 /// The newest pictures of a folder, oldest first, and what to say of files that are none.
 fn read_all(folder: &Path) -> (Vec<KeptPicture>, Option<Error>) {
-    let (mut found, mut failures) = (Vec::new(), Vec::new());
-    for file in files(folder).iter().rev() {
-        match read(file) {
-            Ok(kept) => found.push(kept),
-            Err(error) => failures.push(error),
-        }
-        if found.len() == MAX_PICTURES {
-            break;
-        }
-    }
+    let (files, mut failures) = (files(folder), Vec::new());
+    let kept = files.iter().rev().filter_map(|file| read(file).map_err(|e| failures.push(e)).ok());
+    let mut found: Vec<KeptPicture> = kept.take(MAX_PICTURES).collect();
     found.reverse();
     let count = failures.len();
-    let sentence = failures.into_iter().next().map(|first| match count {
-        1 => first,
-        _ => {
-            Error::at(folder, format!("{count} kept pictures cannot be read; the newest: {first}"))
-        }
-    });
-    (found, sentence)
+    let of_all = |first: Error| {
+        Error::at(folder, format!("{count} kept pictures cannot be read; the newest: {first}"))
+    };
+    let first = failures.into_iter().next();
+    (found, first.map(|first| if count > 1 { of_all(first) } else { first }))
 }
 
 /// The newest files of a folder, oldest first.

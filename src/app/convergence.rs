@@ -37,17 +37,11 @@ impl Convergence {
         // The last one, or one that somebody has come back to.
         let is_known =
             |run: &Run| run.points.first().is_some_and(|old| old.seconds == first.seconds);
-        let mut run = match self.runs.iter().rposition(is_known) {
-            Some(at) => self.runs.remove(at),
-            None => {
-                self.count += 1;
-                let name = name_of(sampling).to_owned();
-                Run { name, number: self.count, points: Vec::new() }
-            }
-        };
-        run.points.clone_from(main);
-        let number = run.number;
-        self.runs.push(run);
+        let known = self.runs.iter().rposition(is_known).map(|at| self.runs.remove(at));
+        self.count += usize::from(known.is_none());
+        let (name, number) =
+            known.map_or_else(|| (name_of(sampling), self.count), |run| (run.name, run.number));
+        self.runs.push(Run { name, number, points: main.clone() });
         if self.runs.len() > MAX_RUNS {
             self.runs.remove(0);
         }

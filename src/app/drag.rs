@@ -101,9 +101,7 @@ impl Drag {
                     *drag = Some(Self { button, from, at, is_click, slack, has_command });
                 }
                 Event::PointerMoved(to) => {
-                    if let Some(drag) = drag {
-                        drag.move_to(to, modifiers, &mut steps);
-                    }
+                    drag.iter_mut().for_each(|drag| drag.move_to(to, modifiers, &mut steps));
                 }
                 Event::PointerButton { pos, button, pressed: false, modifiers: held } => {
                     modifiers = held;

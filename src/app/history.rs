@@ -24,7 +24,7 @@ pub(crate) struct History {
 
 impl History {
     /// Takes over what earlier windows left; how many those are.
-    pub(crate) fn take_over(&mut self, mut earlier: Vec<KeptPicture>) -> usize {
+    pub(crate) fn take_over(&mut self, earlier: Vec<KeptPicture>) -> usize {
         let number = |kept: &KeptPicture| kept.name.rsplit(' ').next()?.parse().ok();
         self.count = earlier.iter().filter_map(number).fold(self.count, u32::max);
         let count = earlier.len();
@@ -32,8 +32,7 @@ impl History {
             self.count = self.count.saturating_add(1);
             kept.name = format!("Picture {}", self.count);
         }
-        earlier.append(&mut self.list);
-        self.list = earlier;
+        self.list.splice(0..0, earlier);
         count
     }
 
@@ -60,10 +59,7 @@ impl History {
             file: None,
         };
         let written = self.album.as_mut().map(|album| album.write(&kept)).transpose();
-        let (file, failure) = match written {
-            Ok(file) => (file, Ok(())),
-            Err(error) => (None, Err(error)),
-        };
+        let (file, failure) = written.map_or_else(|e| (None, Err(e)), |file| (file, Ok(())));
         self.list.push(KeptPicture { file, ..kept });
         while self.list.len() > MAX_PICTURES {
             self.remove(0);
@@ -83,8 +79,7 @@ impl History {
 
     /// Drops one, and its file.
     pub(crate) fn remove(&mut self, index: usize) {
-        let kept = self.list.remove(index);
-        if let (Some(album), Some(file)) = (&self.album, kept.file) {
+        if let (Some(album), Some(file)) = (&self.album, self.list.remove(index).file) {
             album.remove(file);
         }
     }

@@ -129,17 +129,10 @@ impl LoadedMap {
         let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
         let environment = Environment::new(map, &options).at(name)?;
         let seconds = [seconds_of_reading, start.elapsed().as_secs_f64()];
-        let preview = environment.map().shrunk(256);
-        Ok(Self {
-            name: name.to_owned(),
-            sun_factor,
-            sun: Sun::of(environment.map()),
-            preview: Arc::new(preview),
-            environment: Arc::new(environment),
-            notices,
-            seconds,
-            sun_texels,
-        })
+        let preview = Arc::new(environment.map().shrunk(256));
+        let (name, sun) = (name.to_owned(), Sun::of(environment.map()));
+        let environment = Arc::new(environment);
+        Ok(Self { name, sun_factor, environment, preview, sun, notices, seconds, sun_texels })
     }
 }
 
@@ -226,8 +219,7 @@ impl Loader {
         let (own, mut options) = (name.to_owned(), self.first.1.clone());
         if self.first.0 != name {
             // Its names are of another scene.
-            options =
-                SceneOptions { variant: None, hide: Vec::new(), edits: Vec::new(), ..options };
+            (options.variant, options.hide, options.edits) = (None, Vec::new(), Vec::new());
         }
         self.spawn(Kind::Scene, name, false, move |steps| {
             Loaded::Scene(load_scene(&own, &options, steps))
@@ -271,13 +263,12 @@ impl Loader {
 
     /// What has been loaded since the last call, by name; results nobody waits for any more are dropped.
     pub fn take(&mut self) -> Vec<(String, Loaded)> {
-        let mut results = Vec::new();
-        for (Steps(step), loaded) in self.receiver.try_iter() {
+        let wanted = |(Steps(step), loaded): (Steps, Loaded)| {
             let is_this = |of: &mut InFlight| Arc::as_ptr(&of.step) == step.as_ptr();
             let found = self.in_flight.iter_mut().find_map(|slot| slot.take_if(is_this));
-            results.extend(found.map(|in_flight| (in_flight.name, loaded)));
-        }
-        results
+            Some((found?.name, loaded))
+        };
+        self.receiver.try_iter().filter_map(wanted).collect()
     }
 
     fn spawn(

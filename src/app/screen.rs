@@ -108,9 +108,7 @@ impl TextureCopies {
             for change in changes {
                 match self.0.get_mut(id).zip(change.pos) {
                     Some((whole, corner)) => paste(whole, &change.image, corner),
-                    None => {
-                        self.0.insert(*id, change.clone());
-                    }
+                    None => drop(self.0.insert(*id, change.clone())),
                 }
             }
         }

@@ -40,8 +40,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     });
     let lines = lines(convergence, by_samples);
     if lines.is_empty() {
-        theme::note(ui, "The plot begins at two samples per pixel.");
-        return;
+        return theme::note(ui, "The plot begins at two samples per pixel.");
     }
     Plot::new("convergence")
         // Errors fall: there is room below their beginning.
@@ -76,7 +75,6 @@ const NARROW: f64 = 0.5;
 /// Where grid lines are between two powers of ten: at 1, 2, ... 9 of every decade; within half a
 /// decade, at round numbers.
 fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
-    let mut marks = Vec::new();
     if high - low < NARROW {
         let (low, high) = (10_f64.powf(low), 10_f64.powf(high));
         let power = 10_f64.powf(((high - low) / 3.0).log10().floor());
@@ -85,19 +83,16 @@ fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
         let first = (low / step).ceil();
         let count = ((high - low) / step) as u32;
         let values = (0..=count).map(|i| (first + f64::from(i)) * step);
-        marks.extend(values.map(|v| GridMark { value: v.log10(), step_size: 1.0 }));
-        return marks;
+        return values.map(|v| GridMark { value: v.log10(), step_size: 1.0 }).collect();
     }
     let numbered = numbered(high - low);
-    for decade in (low.floor() as i32)..=(high.ceil() as i32) {
-        for step in 1..10 {
-            let value = f64::from(decade) + f64::from(step).log10();
-            // The plot leaves out numbers of steps that are narrow on the screen.
-            let step_size = if numbered.contains(&step) { 1.0 } else { 0.1 };
-            marks.push(GridMark { value, step_size });
-        }
-    }
-    marks
+    let mark = |decade: i32, step: i32| GridMark {
+        value: f64::from(decade) + f64::from(step).log10(),
+        // The plot leaves out numbers of steps that are narrow on the screen.
+        step_size: if numbered.contains(&step) { 1.0 } else { 0.1 },
+    };
+    let decades = (low.floor() as i32)..=(high.ceil() as i32);
+    decades.flat_map(|decade| (1..10).map(move |step| mark(decade, step))).collect()
 }
 
 /// Multiples of a power of ten that have numbers on an axis of `span` decades.
@@ -121,23 +116,23 @@ fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
         return String::new();
     }
     let text = theme::figure(value * factor);
-    if text.ends_with('0') && text.contains('.') {
-        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-    }
-    text
+    let trimmed = text.trim_end_matches('0').trim_end_matches('.');
+    if text.contains('.') { trimmed.to_owned() } else { text }
 }
 
 fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
-    let count = convergence.runs.len();
     let mut lines: Vec<Line<'static>> = Vec::new();
+    let place = |point: &Point, error: f64| {
+        let x = if by_samples { point.samples } else { point.seconds };
+        [x.max(1e-6).log10(), error.log10()]
+    };
     let mut add = |run: &Run, color: Color32, width: f32| {
         if run.points.len() > 1 {
             let name = format!("{} · run {}", run.name, run.number);
-            let estimate = run.points.iter().map(|point| place(point, point.noise, by_samples));
+            let estimate = run.points.iter().map(|point| place(point, point.noise));
             let estimate: PlotPoints<'static> = estimate.collect();
             lines.push(Line::new(name.clone(), estimate).color(color).width(width));
-            let truth =
-                |point: &Point| Some(place(point, point.error.filter(|e| *e > 0.0)?, by_samples));
+            let truth = |point: &Point| Some(place(point, point.error.filter(|e| *e > 0.0)?));
             let measured: Vec<[f64; 2]> = run.points.iter().filter_map(truth).collect();
             if !measured.is_empty() {
                 let line = Line::new(format!("{name}, true"), measured).color(color).width(width);
@@ -145,21 +140,17 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
             }
         }
     };
-    for (i, run) in convergence.runs.iter().enumerate() {
-        let is_current = i + 1 == count;
-        let [r, g, b] = palette::hsv(0.55 + 0.11 * (run.number - 1) as f32, 0.25, 0.55);
-        let color = if is_current { theme::ACCENT } else { Color32::from_rgb(r, g, b) };
-        add(run, color, if is_current { 2.0 } else { 1.2 });
+    if let Some((current, earlier)) = convergence.runs.split_last() {
+        for run in earlier {
+            let [r, g, b] = palette::hsv(0.55 + 0.11 * (run.number - 1) as f32, 0.25, 0.55);
+            add(run, Color32::from_rgb(r, g, b), 1.2);
+        }
+        add(current, theme::ACCENT, 2.0);
     }
     if let Some(run) = &convergence.plain {
         add(run, theme::SECOND, 2.0);
     }
     lines
-}
-
-fn place(point: &Point, error: f64, by_samples: bool) -> [f64; 2] {
-    let x = if by_samples { point.samples } else { point.seconds };
-    [x.max(1e-6).log10(), error.log10()]
 }
 
 #[cfg(test)]
