@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::history::History;
 use super::interface::Chosen;
-use super::kept_picture::Pixels;
+use super::kept_picture::{KeptPicture, Pixels};
 use crate::develop::LinearPicture;
 use crate::image::Image;
 use crate::metrics::relative_rms_error;
@@ -60,12 +60,10 @@ impl Comparison {
         let left = history.list.get(chosen.left?)?;
         let right = chosen.right.and_then(|right| history.list.get(right));
         let name = right.map_or("Now", |kept| &kept.name).to_owned();
+        let region = |kept: &KeptPicture| kept.document.seen_region();
         Some(Self {
             names: [left.name.clone(), name],
-            regions: [
-                left.document.seen_region(),
-                right.and_then(|kept| kept.document.seen_region()),
-            ],
+            regions: [region(left), right.and_then(region)],
             left: Arc::clone(&left.pixels),
             right: right.map(|kept| Arc::clone(&kept.pixels)),
             is_difference: chosen.is_difference,
@@ -76,11 +74,9 @@ impl Comparison {
     pub(super) fn prepare(&self, gpu: &Gpu, now: impl FnOnce() -> Arc<Image>) -> Compared {
         let mut compared = Compared::default();
         let right = self.right.as_ref().map(|pixels| pixels.get()).transpose();
-        let (left, right) = match (self.left.get(), right) {
-            (Ok(left), Ok(right)) => (left, right),
-            (Err(failure), _) | (_, Err(failure)) => {
-                return Compared { failure: Some(failure), ..compared };
-            }
+        let (left, right) = match self.left.get().and_then(|left| Ok((left, right?))) {
+            Ok(both) => both,
+            Err(failure) => return Compared { failure: Some(failure), ..compared },
         };
         compared.read = right.iter().chain([&left]).cloned().collect();
         if self.is_difference {

@@ -77,8 +77,7 @@ impl Edited {
     /// of view is vertical.
     pub(super) fn follow_room(&mut self, room: Option<[u32; 2]>) {
         let Some(room) = room else { return };
-        let before = self.room.replace(room).filter(|before| *before != room);
-        let Some(before) = before else { return };
+        let Some(before) = self.room.replace(room).filter(|before| *before != room) else { return };
         let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
         let factor = aspect(before) / aspect(room);
         self.document.follow_room(factor);
@@ -95,18 +94,16 @@ impl Edited {
         if asked == self.affordable {
             return Ok(());
         }
-        let mut checked = Ok(());
         if let PictureSize::Fixed(width, height) = asked.0 {
             // A region of how many pixels is known once there is a camera.
             let Some(view) = self.document.view(width, height) else { return Ok(()) };
-            checked = memory::check(view.pixels() * BYTES_PER_PIXEL)
-                .map_err(|cause| format!("a picture of {width} x {height} pixels {cause}"));
-            if checked.is_err() {
+            if let Err(cause) = memory::check(view.pixels() * BYTES_PER_PIXEL) {
                 let (size, region) = self.affordable;
                 self.put_back(|document| (document.size, document.region) = (size, region));
+                return Err(format!("a picture of {width} x {height} pixels {cause}"));
             }
         }
-        self.affordable = (self.document.size, self.document.region);
-        checked
+        self.affordable = asked;
+        Ok(())
     }
 }

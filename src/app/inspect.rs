@@ -116,20 +116,14 @@ impl Inspector {
 
     /// Sums up the distributions, unless they are still the same.
     fn sum_up(&mut self, snapshot: &Snapshot) {
-        let Some(grid) = snapshot.main.grid.as_ref().filter(|grid| grid.distributions().len() > 1)
-        else {
-            self.learned = None;
-            return;
-        };
-        if self.learned.as_ref().is_some_and(|(old, _)| Arc::ptr_eq(old, grid)) {
-            return;
-        }
+        let grid = snapshot.main.grid.as_ref().filter(|grid| grid.distributions().len() > 1);
+        self.learned.take_if(|(old, _)| grid.is_none_or(|grid| !Arc::ptr_eq(old, grid)));
+        let Some(grid) = grid.filter(|_| self.learned.is_none()) else { return };
         let distributions = grid.distributions();
         // The first distribution is the whole map's.
         let own = 1..distributions.len();
         let sum = |tile| own.clone().map(|number| distributions.probability(number, tile)).sum();
-        let sums = (0..distributions.tile_count()).map(sum).collect();
-        self.learned = Some((Arc::clone(grid), sums));
+        self.learned = Some((Arc::clone(grid), (0..distributions.tile_count()).map(sum).collect()));
     }
 
     /// Measures the truth at the inspected point by brute force, unless one is being measured.

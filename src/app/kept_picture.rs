@@ -60,8 +60,7 @@ impl Pixels {
     pub(crate) fn leave_to(&self, file: PathBuf) {
         let mut source = lock(&self.0);
         if let Source::Here(image) = &*source {
-            let known = Arc::downgrade(image);
-            *source = Source::InFile(file, known);
+            *source = Source::InFile(file, Arc::downgrade(image));
         }
     }
 
@@ -76,8 +75,7 @@ impl Pixels {
                 if let Some(image) = known.upgrade() {
                     return Ok(image);
                 }
-                let image = read_picture(file).map_err(|error| error.to_string())?;
-                let image = Arc::new(image);
+                let image = Arc::new(read_picture(file).map_err(|error| error.to_string())?);
                 *known = Arc::downgrade(&image);
                 Ok(image)
             }

@@ -59,15 +59,13 @@ impl Rendering {
 
     /// Whether no light reaches what the camera sees, if that has not been said of this scene.
     pub(super) fn turns_out_dark(&mut self) -> bool {
-        let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole()) else {
-            return false;
-        };
+        let whole = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole());
+        let Some(snapshot) = whole else { return false };
         let (main, geometry) = (&snapshot.main, &snapshot.request.world.geometry);
-        let is_new = self.dark.as_ref().is_none_or(|said| !Arc::ptr_eq(said, geometry));
-        let is_dark = main.on_device.is_none()
+        let turns_out = self.dark.as_ref().is_none_or(|said| !Arc::ptr_eq(said, geometry))
+            && main.on_device.is_none()
             && main.film.min_samples() >= MIN_SAMPLES
             && main.film.is_dark();
-        let turns_out = is_new && is_dark;
         if turns_out {
             self.dark = Some(Arc::clone(geometry));
         }
