@@ -63,8 +63,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         Some(inspected) => {
             measure(ui, interface, inspector.busy, commands);
             if let Some(truth) = inspector.truth() {
-                let misplaced = inspected.cell.map(|_| misplaced(truth, inspected));
-                pixel_light::show(ui, truth, misplaced);
+                pixel_light::show(ui, truth, inspected.cell.map(|_| misplaced(truth, inspected)));
             }
             facts(ui, inspected);
             cached(ui, inspected, snapshot);
@@ -79,21 +78,17 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         ui.add_space(4.0);
         let hint =
             "All distributions as .csv, .json or .exr (one row a distribution, one column a tile)";
-        let command = Command::Ask(Purpose::Distributions);
-        button(ui, ("Export distributions…", hint), commands, command);
+        button(ui, ("Export distributions…", hint), commands, Command::Ask(Purpose::Distributions));
     }
 }
 
 fn tile_views(ui: &mut Ui, interface: &mut Interface) {
-    const VIEWS: [(TileView, &str, &str); 2] = [
-        (TileView::Energy, "Energy", "Share of the map's energy in each tile"),
-        (TileView::Learned, "Learned", "Learned probability of each tile, summed over all cells"),
-    ];
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (view, name, hint) in VIEWS {
-            ui.selectable_value(&mut interface.tiles, view, name).on_hover_text(hint);
-        }
+        let hint = "Share of the map's energy in each tile";
+        ui.selectable_value(&mut interface.tiles, TileView::Energy, "Energy").on_hover_text(hint);
+        let hint = "Learned probability of each tile, summed over all cells";
+        ui.selectable_value(&mut interface.tiles, TileView::Learned, "Learned").on_hover_text(hint);
     });
 }
 
@@ -135,10 +130,9 @@ fn tiles(
         painter.rect_filled(map_view::tile_rect(rect, size, tile as u32), 0.0, color);
     }
     if let Some(sun) = sun {
-        let scale = rect.size()
-            / Vec2::new(map.environment.map().width as f32, map.environment.map().height as f32);
-        let at = rect.min
-            + (Vec2::new(sun.texel[0] as f32, sun.texel[1] as f32) + Vec2::splat(0.5)) * scale;
+        let image = map.environment.map();
+        let scale = rect.size() / Vec2::new(image.width as f32, image.height as f32);
+        let at = rect.min + Vec2::from(sun.texel.map(|texel| texel as f32 + 0.5)) * scale;
         painter.circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
     }
     let mark = |tile: u32, color: Color32| {
@@ -187,9 +181,7 @@ fn measure(ui: &mut Ui, interface: &mut Interface, is_busy: bool, commands: &mut
         let button = ui.add_enabled(!is_busy, egui::Button::new(label));
         let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
         if button.on_hover_text(hint).clicked() {
-            if interface.pinned.is_none() {
-                interface.pinned = interface.pointed;
-            }
+            interface.pinned = interface.inspected();
             commands.push(Command::MeasureTruth);
         }
         if interface.pinned.is_some() && ui.button("Unpin").clicked() {
@@ -200,8 +192,7 @@ fn measure(ui: &mut Ui, interface: &mut Interface, is_busy: bool, commands: &mut
 
 /// Share of the learned probability that lies where the truth has none.
 fn misplaced(truth: &Truth, inspected: &Inspected) -> f32 {
-    let pairs = truth.shares.iter().zip(&inspected.probabilities);
-    pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum()
+    truth.shares.iter().zip(&inspected.probabilities).map(|(a, b)| 0.5 * (a - b).abs()).sum()
 }
 
 fn cell(
@@ -315,23 +306,19 @@ fn in_rows(ui: &mut Ui, id: &str, facts: impl FnOnce(&mut dyn FnMut(&str, String
 /// What the radiance cache knows there.
 fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     let Some(snapshot) = snapshot else { return };
-    let (cell, cache) = match (&inspected.cached, &snapshot.cache) {
-        (Some(cell), Ok(cache)) => (cell, cache),
-        (_, Err(missing)) => {
-            theme::note(ui, overlay::no_cache(*missing));
-            return;
-        }
-        (None, Ok(_)) => return,
+    let cache = match &snapshot.cache {
+        Ok(cache) => cache,
+        Err(missing) => return theme::note(ui, overlay::no_cache(*missing)),
     };
+    let Some(cell) = &inspected.cached else { return };
     let face = FACES.get(cell.face as usize).copied().unwrap_or("all");
-    let radiance = match (cell.samples, cell.samples_around) {
+    let (trained, radiance) = match (cell.samples, cell.samples_around) {
         // The albedo is not known, either.
-        (0, 0) => "unknown".to_owned(),
-        _ => cell.radiance.to_array().map(|light| theme::figure(f64::from(light))).join("  "),
-    };
-    let trained = match (cell.samples, cell.samples_around) {
-        (0, 0) => "untrained: the global mean is used".to_owned(),
-        (own, around) => format!("{} samples, {} around", theme::count(own), theme::count(around)),
+        (0, 0) => ("untrained: the global mean is used".to_owned(), "unknown".to_owned()),
+        (own, around) => (
+            format!("{} samples, {} around", theme::count(own), theme::count(around)),
+            cell.radiance.to_array().map(|light| theme::figure(f64::from(light))).join("  "),
+        ),
     };
     in_rows(ui, "cached", |line| {
         let place = format!("level {}, edge {}, face {face}", cell.level, length(cell.edge));

@@ -114,11 +114,10 @@ fn files_named<'a>(
 
 /// A row of a list, with what it looks like if that is known.
 fn named(ui: &mut Ui, is_current: bool, small: Option<&TextureHandle>, name: &str) -> Response {
-    let row = match small {
+    ui.add(match small {
         Some(texture) => Button::selectable(is_current, (map_view::small(texture), name)),
         None => Button::selectable(is_current, name),
-    };
-    ui.add(row)
+    })
 }
 
 fn cameras(ui: &mut Ui, scope: &mut Scope<'_>) {
@@ -127,11 +126,8 @@ fn cameras(ui: &mut Ui, scope: &mut Scope<'_>) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::Vec2::splat(4.0);
         for (i, camera) in scene.iter().flat_map(|s| s.world.scene.cameras.iter()).enumerate() {
-            let name = if camera.name.is_empty() {
-                format!("Camera {}", i + 1)
-            } else {
-                camera.name.clone()
-            };
+            let own = Some(camera.name.clone()).filter(|name| !name.is_empty());
+            let name = own.unwrap_or_else(|| format!("Camera {}", i + 1));
             let distance = document.viewpoint.as_ref().map_or(3.0, |v| v.pivot_distance);
             let command = Command::LookFrom(Viewpoint::of(camera, distance));
             button(ui, (&name, "Look through this camera of the scene"), commands, command);
@@ -206,9 +202,8 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
         let small = |name: &str| library.small_maps.textures.get(name);
         let current = lasting_map(&document.map);
         let beside = library.small_maps.beside(&current);
-        let is_recent = |name: &String| !beside.contains(name);
-        let recent: Vec<String> =
-            library.settings.recent_maps.iter().filter(|name| is_recent(name)).cloned().collect();
+        let mut recent = library.settings.recent_maps.clone();
+        recent.retain(|name| !beside.contains(name));
         files_named(ui, "In its folder", beside, &current, small, &mut chosen);
         files_named(ui, "Recent", &recent, &current, small, &mut chosen);
         commands.push(Command::MakeSmallMap);
@@ -223,8 +218,7 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
     let degrees = &mut document.rotation_degrees;
     let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
     let slider = slider.clamping(SliderClamping::Never);
-    let hint = "Rotates the map about the vertical axis";
-    if theme::set(ui, "Rotation", hint, slider).dragged() {
+    if theme::set(ui, "Rotation", "Rotates the map about the vertical axis", slider).dragged() {
         interface.keep_turning(ui.ctx());
     }
     // Somebody may type -90.
@@ -233,10 +227,9 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
     }
     let words = ("Put the sun…", "Then click or drag in the picture where it is to shine (L)");
     button(ui, words, commands, Command::ToggleSun);
-    let slider = factor(&mut document.intensity);
-    let is_dragged = theme::set(ui, "Intensity", "Brightness of the map", slider).dragged();
     let is_late = document.mix().is_none();
-    if is_dragged && is_late {
+    let slider = factor(&mut document.intensity);
+    if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() && is_late {
         interface.keep_moving(ui.ctx());
     }
     let hint = "Brightness of the map's sun alone; its sky stays as it is";
@@ -248,11 +241,10 @@ fn environment(ui: &mut Ui, scope: &mut Scope<'_>) {
     let why_not = format!("Not beside a split view, nor with more than {MAX_LAMPS} lamps");
     ui.add_enabled(may_mix, mix).on_hover_text(hint).on_disabled_hover_text(why_not);
     background(ui, &mut document.background);
-    if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
-        let text = RichText::new("Reset rotation, intensity and sun").size(12.0);
-        if ui.button(text).clicked() {
-            (document.rotation_degrees, document.intensity, document.sun) = (0.0, 1.0, 1.0);
-        }
+    if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0)
+        && ui.button(RichText::new("Reset rotation, intensity and sun").size(12.0)).clicked()
+    {
+        (document.rotation_degrees, document.intensity, document.sun) = (0.0, 1.0, 1.0);
     }
 }
 
@@ -289,9 +281,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
             }
         }
         Background::Color(rgb) => {
-            theme::row(ui, "Colour", "Background colour, linear", |ui| {
-                theme::color(ui, rgb);
-            });
+            theme::row(ui, "Colour", "Background colour, linear", |ui| theme::color(ui, rgb));
         }
     }
 }
@@ -312,11 +302,8 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: &Scene) {
         let hint = "Participating medium (scatters and absorbs light)";
         if ui.checkbox(&mut is_on, "Fill the air").on_hover_text(hint).changed() {
             let thick = frame.medium(Medium { scattering: Vec3::splat(FIRST_FOG), ..clear });
-            edited = match (is_on, own) {
-                (false, _) => clear,
-                (true, Some(own)) if own != clear => own,
-                (true, _) => thick,
-            };
+            let own = own.filter(|own| *own != clear);
+            edited = if is_on { own.unwrap_or(thick) } else { clear };
         }
     });
     if is_on {
@@ -346,9 +333,7 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: &Scene) {
     if edited != now {
         *fog = Some(edited);
     }
-    if fog.is_some_and(|fog| Some(fog) == own || (own.is_none() && fog == clear)) {
-        *fog = None;
-    }
+    fog.take_if(|fog| *fog == own.unwrap_or(clear));
 }
 
 /// Scattering per metre of fog that is switched on: seen in a room, not hiding it.
