@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use egui::emath::Numeric;
+use egui::style::Widgets;
 use egui::{
     Align2, Color32, CornerRadius, DragValue, FontId, Margin, Pos2, Rect, Response, RichText,
     Shape, Slider, SliderClamping, Stroke, SurrenderFocusOn, TextEdit, TextStyle, Ui, Vec2,
@@ -66,7 +67,6 @@ pub(super) fn apply(context: &egui::Context) {
 
 fn visuals() -> Visuals {
     let mut visuals = Visuals::dark();
-    let radius = CornerRadius::same(5);
     visuals.panel_fill = PANEL;
     visuals.window_fill = Color32::from_rgb(38, 40, 45);
     visuals.window_stroke = Stroke::new(1.0, Color32::from_rgb(62, 65, 72));
@@ -79,25 +79,19 @@ fn visuals() -> Visuals {
     visuals.slider_trailing_fill = true;
     visuals.selection.bg_fill = Color32::from_rgb(122, 86, 34);
     visuals.selection.stroke = Stroke::new(1.0, Color32::from_rgb(255, 232, 196));
-    let widgets = &mut visuals.widgets;
-    for widget in [
-        &mut widgets.noninteractive,
-        &mut widgets.inactive,
-        &mut widgets.hovered,
-        &mut widgets.active,
-        &mut widgets.open,
-    ] {
-        widget.corner_radius = radius;
+    let Widgets { noninteractive, inactive, hovered, active, open } = &mut visuals.widgets;
+    for widget in [&mut *noninteractive, &mut *inactive, &mut *hovered, &mut *active, open] {
+        widget.corner_radius = CornerRadius::same(5);
         widget.fg_stroke = Stroke::new(1.0, TEXT);
     }
-    widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(50, 52, 58));
-    widgets.inactive.bg_fill = FIELD;
-    widgets.inactive.weak_bg_fill = FIELD;
-    widgets.hovered.bg_fill = Color32::from_rgb(66, 69, 77);
-    widgets.hovered.weak_bg_fill = Color32::from_rgb(66, 69, 77);
-    widgets.hovered.bg_stroke = Stroke::new(1.0, Color32::from_rgb(96, 100, 110));
-    widgets.active.bg_fill = Color32::from_rgb(122, 86, 34);
-    widgets.active.weak_bg_fill = Color32::from_rgb(122, 86, 34);
+    noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(50, 52, 58));
+    inactive.bg_fill = FIELD;
+    inactive.weak_bg_fill = FIELD;
+    hovered.bg_fill = Color32::from_rgb(66, 69, 77);
+    hovered.weak_bg_fill = Color32::from_rgb(66, 69, 77);
+    hovered.bg_stroke = Stroke::new(1.0, Color32::from_rgb(96, 100, 110));
+    active.bg_fill = Color32::from_rgb(122, 86, 34);
+    active.weak_bg_fill = Color32::from_rgb(122, 86, 34);
     visuals
 }
 

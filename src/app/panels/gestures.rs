@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Align2, CursorIcon, Key, Modifiers, PointerButton, Pos2, Rect, Response, Stroke, StrokeKind, Ui,
-};
+use egui::{Align2, CursorIcon, Key, PointerButton, Pos2, Rect, Response, Stroke, StrokeKind, Ui};
 use glam::Vec3;
 
 use super::scope::Scope;
@@ -33,7 +31,7 @@ pub(super) fn show(
         Some(Tool::Region) => mark_region(ui, whole, &steps, scope),
         Some(Tool::Sun) => put_sun(ui, rect, &steps, scope),
         None => {
-            point(rect, response, ui.input(|input| input.modifiers), scope);
+            point(ui, rect, response, scope);
             travel(ui, whole, response, &steps, scope);
         }
     }
@@ -60,8 +58,7 @@ fn put_sun(ui: &Ui, rect: Rect, steps: &[Step], scope: &mut Scope<'_>) {
     }
     let place = end.or(held.filter(|_| !steps.is_empty()));
     let place = place.filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
-    let command = |place| Command::PutSun { place, is_last: end.is_some() };
-    scope.commands.extend(place.map(command));
+    scope.commands.extend(place.map(|place| Command::PutSun { place, is_last: end.is_some() }));
 }
 
 /// Lets a drag mark the part that is to be rendered.
@@ -84,7 +81,7 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
 }
 
 /// Where the pointer is, and what a click does there.
-fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scope<'_>) {
+fn point(ui: &Ui, rect: Rect, response: &Response, scope: &mut Scope<'_>) {
     if scope.display.shown.as_ref().is_some_and(|shown| shown.order.covers_now()) {
         // A kept picture has colours and no more.
         scope.interface.pointed = None;
@@ -94,12 +91,11 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
         response.hover_pos().filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
     if response.double_clicked() {
         pick(rect, response, scope, Viewpoint::set_pivot);
-    } else if response.clicked() && modifiers.command {
+    } else if response.clicked() && ui.input(|input| input.modifiers.command) {
         pick(rect, response, scope, Viewpoint::focus_on);
     } else if response.clicked() {
         let place = response.interact_pointer_pos().map(|at| place_of(rect, at));
-        let is_inspecting = scope.interface.tab == Tab::Inspect;
-        scope.interface.pinned = place.filter(|_| is_inspecting);
+        scope.interface.pinned = place.filter(|_| scope.interface.tab == Tab::Inspect);
         let spot = clicked_spot(rect, response, scope);
         scope.interface.choose_material(spot.map(|spot| spot.material));
     }
@@ -147,12 +143,10 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
             viewpoint.orbit_within(scene.map(|scene| &*scene.world), by);
         }
     }
-    if response.hovered() {
-        let wheel = context.input(|i| i.smooth_scroll_delta().y);
-        if wheel != 0.0 {
-            moved = true;
-            viewpoint.dolly(wheel / 50.0);
-        }
+    let wheel = context.input(|i| i.smooth_scroll_delta().y);
+    if response.hovered() && wheel != 0.0 {
+        moved = true;
+        viewpoint.dolly(wheel / 50.0);
     }
     let may_fly = !context.text_edit_focused() && !scope.interface.is_modal();
     hold_keys(context, may_fly, &mut scope.interface.flying);
@@ -230,7 +224,7 @@ fn flight(context: &egui::Context, held: &[Key], speed: f32) -> Option<Vec3> {
 
 #[cfg(test)]
 mod tests {
-    use egui::{Event, RawInput};
+    use egui::{Event, Modifiers, RawInput};
 
     use super::*;
 

@@ -20,20 +20,17 @@ pub(super) fn show(ui: &mut Ui, scope: &mut Scope<'_>, scene: &LoadedScene) {
             None => name,
         }
     };
-    let chosen = interface.material.and_then(|number| scene.materials.get(number as usize));
-    let text = match (interface.material, chosen) {
-        (Some(number), Some(_)) => title(number),
-        _ => "Click a surface".to_owned(),
-    };
+    let found = |number: u32| Some((number, scene.materials.get(number as usize)?));
+    let chosen = interface.material.and_then(found);
+    let text = chosen.map_or_else(|| "Click a surface".to_owned(), |(number, _)| title(number));
     theme::choice(ui, "material").selected_text(text).show_ui(ui, |ui| {
         for number in 0..scene.materials.len() as u32 {
-            let is_chosen = interface.material == Some(number);
-            if ui.selectable_label(is_chosen, title(number)).clicked() {
+            if ui.selectable_label(interface.material == Some(number), title(number)).clicked() {
                 interface.material = Some(number);
             }
         }
     });
-    let (Some(number), Some(material)) = (interface.material, chosen) else { return };
+    let (Some(number), Some((_, material))) = (interface.material, chosen) else { return };
     let before = document.materials.get(&number).copied().unwrap_or_default();
     let mut edit = before;
     let now = MaterialEdit::like(&MaterialEdit { hidden: false, ..edit }.apply(material));
@@ -63,10 +60,9 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, now: MaterialEdit, material: &Ma
         ("Metalness", surface, &mut edit.metalness, now.metalness),
         ("Opacity", base, &mut edit.opacity, now.opacity),
     ] {
-        let slider = |ui: &mut Ui, value: &mut f32| {
+        setting(ui, (name, hint), value, now, |ui, value| {
             ui.add(theme::slider(value, 0.0..=1.0).fixed_decimals(2)).changed()
-        };
-        setting(ui, (name, hint), value, now, slider);
+        });
     }
     let hint = "Largest component of the radiance that its surfaces emit";
     setting(ui, ("Emission", hint), &mut edit.emission, now.emission, |ui, value| {

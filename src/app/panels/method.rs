@@ -28,15 +28,13 @@ const TITLE: &str =
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let light = &mut scope.document.light;
     theme::row(ui, "Sampling", "How the map is sampled; only noise and speed differ", |ui| {
-        ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
-            ui,
-            |ui| {
-                for (sampling, hint) in WAYS {
-                    let chosen = &mut light.sampling;
-                    ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
-                }
-            },
-        );
+        let list = ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling));
+        list.show_ui(ui, |ui| {
+            for (sampling, hint) in WAYS {
+                let chosen = &mut light.sampling;
+                ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
+            }
+        });
     });
     let hint = "Plain sampling on the left, the chosen one on the right, for equal time (V)";
     ui.checkbox(&mut light.split, "Split view").on_hover_text(hint);

@@ -179,24 +179,17 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, scope: &Scope<'_>) {
     };
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {
-            let adapter = &gpu.adapter;
-            let AdapterFacts { name, backend, driver, .. } = adapter;
+            let AdapterFacts { name, backend, driver, .. } = &gpu.adapter;
             let memory = theme::bytes(gpu.device_bytes as usize);
             let hint = format!("{name}, {backend}, driver {driver}; {memory} on the device");
             // Its name has no room where there is little.
-            let name = if theme::is_small(ui) {
-                "GPU".to_owned()
-            } else {
-                format!("GPU, {}", adapter.short_name())
-            };
-            (name, hint)
+            let short = format!("GPU, {}", gpu.adapter.short_name());
+            (if theme::is_small(ui) { "GPU".to_owned() } else { short }, hint)
         }
         None => {
             let word = if threads == 1 { "thread" } else { "threads" };
-            (
-                format!("CPU, {threads} {word}"),
-                "Size of the picture in pixels, and the rendering device".to_owned(),
-            )
+            let hint = "Size of the picture in pixels, and the rendering device".to_owned();
+            (format!("CPU, {threads} {word}"), hint)
         }
     };
     let zoomed = scope.interface.magnification(scope.document.size);

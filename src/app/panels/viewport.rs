@@ -34,8 +34,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let shown = scope.display.shown.clone();
         let Some((shown, settings)) = shown.as_deref().zip(settings) else {
             ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
-            waiting(ui, area, scope.assets.loader.busy_with().next().is_some());
-            return;
+            return waiting(ui, area, scope.assets.loader.busy_with().next().is_some());
         };
         let places = Places::of((area, scale), shown, scope);
         let (whole, rect) = (places.whole, places.rect);
@@ -136,8 +135,7 @@ fn beside(
         }
         places.zoomed(part)
     });
-    let has_squares = has_squares(other, shown, scope);
-    let shape = source.shape(of_left, has_squares);
+    let shape = source.shape(of_left, has_squares(other, shown, scope));
     let handle = wipe(ui, (seen, of_left), shape, scope.interface);
     match compared {
         Some(compared) => wipe_labels(ui, seen, &compared.names, None),
@@ -158,17 +156,16 @@ fn difference_label(ui: &Ui, seen: Rect, [left, right]: &[String; 2], apart: Opt
 fn surround(ui: &Ui, area: Rect, covered: Rect) {
     // A bit under its edges, which lie between pixels.
     let covered = covered.shrink(1.0);
+    // What lies above nothing is all.
+    let is_met = covered.is_positive() && covered.intersects(area);
+    let covered = if is_met { covered } else { Rect::from_min_max(area.max, area.max) };
     let rows = area.y_range().intersection(covered.y_range());
-    let bars = if covered.is_positive() && covered.intersects(area) {
-        [
-            area.with_max_y(covered.top()),
-            area.with_min_y(covered.bottom()),
-            Rect::from_x_y_ranges(area.left()..=covered.left(), rows),
-            Rect::from_x_y_ranges(covered.right()..=area.right(), rows),
-        ]
-    } else {
-        [area, Rect::NOTHING, Rect::NOTHING, Rect::NOTHING]
-    };
+    let bars = [
+        area.with_max_y(covered.top()),
+        area.with_min_y(covered.bottom()),
+        Rect::from_x_y_ranges(area.left()..=covered.left(), rows),
+        Rect::from_x_y_ranges(covered.right()..=area.right(), rows),
+    ];
     for bar in bars.into_iter().filter(|bar| bar.is_positive()) {
         ui.painter().rect_filled(bar, 0.0, theme::BACKGROUND);
     }
@@ -186,8 +183,7 @@ fn what_would_open(ui: &Ui, area: Rect) {
     let names: Vec<_> = scene.iter().chain(&map).map(|name| theme::file_name(name)).collect();
     let painter = ui.painter();
     painter.rect_filled(area, 0.0, Color32::from_black_alpha(150));
-    let edge = Stroke::new(2.0, theme::ACCENT);
-    painter.rect_stroke(area.shrink(8.0), 6.0, edge, StrokeKind::Inside);
+    painter.rect_stroke(area.shrink(8.0), 6.0, Stroke::new(2.0, theme::ACCENT), StrokeKind::Inside);
     let text = format!("Drop to open {}", names.join(" and "));
     let font = FontId::proportional(18.0);
     painter.text(area.center(), Align2::CENTER_CENTER, text, font, theme::TEXT);
