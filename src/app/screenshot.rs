@@ -64,17 +64,8 @@ impl Studio {
         let wakes = Wakes { draw: wake.clone(), relay: wake };
         let loader = Loader::start(&start.document, start.of_scene.clone(), wakes.draw.clone());
         let app = App::new(start, loader, screen, &context, wakes)?;
-        let deadline = Instant::now() + patience;
-        Ok(Self {
-            app,
-            context,
-            canvas,
-            news,
-            deadline,
-            patience,
-            time: 0.0,
-            pixels_per_point: 1.0,
-        })
+        let (deadline, time, pixels_per_point) = (Instant::now() + patience, 0.0, 1.0);
+        Ok(Self { app, context, canvas, news, deadline, patience, time, pixels_per_point })
     }
 
     /// Draws all but the picture so many times as large, as a screen with small pixels shows it; the window keeps its
@@ -108,12 +99,11 @@ impl Studio {
     /// If the scene cannot be read or has no such material.
     pub fn choose_material(&mut self, name: &str) -> Result<()> {
         self.settle()?;
-        let scene = self.app.assets.scene.iter();
-        let number = scene.flat_map(|scene| scene.materials.iter()).position(|m| m.name == name);
+        let scene = self.app.assets.scene.as_ref();
+        let number = scene.and_then(|scene| scene.materials.iter().position(|m| m.name == name));
         let number = number.ok_or_else(|| {
-            let scene = self.app.assets.scene.as_ref().map(|scene| &scene.world.scene);
-            let cause = scene.map(|scene| scene.without_material(name)).unwrap_or_default();
-            Error::at(&self.app.edited.document.scene, cause)
+            let cause = scene.map(|scene| scene.world.scene.without_material(name));
+            Error::at(&self.app.edited.document.scene, cause.unwrap_or_default())
         })?;
         self.app.interface.choose_material(Some(number as u32));
         Ok(())
@@ -172,16 +162,14 @@ impl Studio {
 
     /// One frame.
     pub(super) fn frame(&mut self) -> Result<()> {
+        let (width, height) = (self.canvas.target.width(), self.canvas.target.height());
         if let Err(loss) = self.canvas.gpu.check() {
             let gpu = Gpu::open(Some(&self.canvas.gpu.facts().name))?;
-            let size = (self.canvas.target.width(), self.canvas.target.height());
             let copies = std::mem::take(&mut self.canvas.copies);
-            self.canvas = Canvas::new(gpu, size, copies);
-            let screen = Screen::new(&self.canvas.gpu, FORMAT)?;
-            self.app.move_to(screen, &loss);
+            self.canvas = Canvas::new(gpu, (width, height), copies);
+            self.app.move_to(Screen::new(&self.canvas.gpu, FORMAT)?, &loss);
         }
         let canvas = &mut self.canvas;
-        let (width, height) = (canvas.target.width(), canvas.target.height());
         let size = egui::Vec2::new(width as f32, height as f32) / self.pixels_per_point;
         let native_pixels_per_point = Some(self.pixels_per_point);
         let viewport = egui::ViewportInfo { native_pixels_per_point, ..Default::default() };
