@@ -107,8 +107,7 @@ impl Assets {
 
     /// Begins to read a file of the document again; whether there is one.
     pub(super) fn read_again(&mut self, kind: Kind, document: &Document) -> bool {
-        let document = &*document.unmixed();
-        let Document { scene, map, sun, .. } = document;
+        let Document { scene, map, sun, .. } = &*document.unmixed();
         self.reload.iter_mut().for_each(|reload| reload.forget(kind));
         match kind {
             Kind::Scene if !sources::is_built_in_scene(scene) => self.loader.load_scene(scene),
@@ -200,12 +199,9 @@ pub(super) fn room_viewpoint(scene: &LoadedScene) -> Option<Viewpoint> {
 fn viewpoint_through(scene: &LoadedScene, camera: &Camera, is_framed: bool) -> Viewpoint {
     let (low, high) = scene.world.bvh.bounds();
     let eye = Vec3::from(camera.world_from_camera.translation);
-    let is_outside = !(eye.cmpge(low) & eye.cmple(high)).all();
     // What is framed from outside is turned about its middle, not about what is seen first or behind it.
-    let distance = match is_framed && is_outside {
-        true => camera.focus_distance,
-        false => pivot_distance(scene, camera),
-    };
+    let is_outside = is_framed && !(eye.cmpge(low) & eye.cmple(high)).all();
+    let distance = if is_outside { camera.focus_distance } else { pivot_distance(scene, camera) };
     let mut viewpoint = Viewpoint::of(camera, distance);
     if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
         viewpoint.focus_distance = distance;

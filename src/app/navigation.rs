@@ -69,13 +69,12 @@ impl Viewpoint {
     pub(super) fn look_around(&mut self, drag: Vec2) {
         let rotation = self.rotation();
         let yaw = Quat::from_rotation_y(-drag.x * RADIANS_PER_POINT);
-        let right = rotation * Vec3::X;
         let angle = -drag.y * RADIANS_PER_POINT;
         // Never over the top: up stays up.
         let steepness = self.forward().y.clamp(-1.0, 1.0).asin();
         let limit = 89.0_f32.to_radians();
         let angle = (steepness + angle).clamp(-limit, limit) - steepness;
-        let pitch = Quat::from_axis_angle(right.normalize_or(Vec3::X), angle);
+        let pitch = Quat::from_axis_angle((rotation * Vec3::X).normalize_or(Vec3::X), angle);
         self.rotation = (yaw * pitch * rotation).normalize().to_array();
     }
 

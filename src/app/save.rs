@@ -48,8 +48,7 @@ impl Saves {
                 let (path, width, height) = (path.display(), film.width, film.height);
                 let saved = format!("Saved {path}, {width} x {height} pixels");
                 let remarks = output::remarks(film, map).into_iter();
-                let sentence = remarks.fold(saved, |all, remark| format!("{all}; {remark}"));
-                Ok(TaskResult::Done(sentence))
+                Ok(TaskResult::Done(remarks.fold(saved, |all, remark| format!("{all}; {remark}"))))
             });
         }
     }
@@ -101,27 +100,23 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
     write_picture(path, &options, films, record.metadata())
 }
 
-/// Changes to materials, as `--material` reads them.
-fn edits(picture: &Picture) -> Vec<String> {
-    let LoadedScene { changes, materials, .. } = &picture.scene;
-    let name = |number: &u32| Some(&materials.get(*number as usize)?.name);
-    let edits = changes.materials.iter();
-    edits.filter_map(|(number, edit)| Some(edit.to_text(name(number)?))).collect()
-}
-
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let document = &picture.document;
     let request = &picture.snapshot.request;
     let mut settings = settings_of(&request.view, &request.world);
     let lamp_edits = document.lamp_edits.iter().map(|(name, edit)| edit.to_text(name));
-    let lamp_edits: Vec<String> = lamp_edits.collect();
+    // As `--material` reads them.
+    let LoadedScene { changes, materials, .. } = &picture.scene;
+    let name = |number: &u32| Some(&materials.get(*number as usize)?.name);
+    let edits = changes.materials.iter();
+    let edits = edits.filter_map(|(number, edit)| Some(edit.to_text(name(number)?)));
     settings.extend([
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
         ("env_sun", json!(document.sun)),
         ("lamps_factor", json!(document.lamps)),
-        ("lamp_edits", json!(lamp_edits)),
-        ("materials", json!(edits(picture))),
+        ("lamp_edits", json!(lamp_edits.collect::<Vec<String>>())),
+        ("materials", json!(edits.collect::<Vec<String>>())),
     ]);
     settings
 }

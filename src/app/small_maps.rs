@@ -77,8 +77,7 @@ impl SmallMaps {
     /// Takes pictures that are ready.
     pub(super) fn take(&mut self, found: SmallMapsFound, context: &Context) {
         for (name, small) in found.maps {
-            let image = color_image(&small);
-            let texture = context.load_texture(&name, image, TextureOptions::LINEAR);
+            let texture = context.load_texture(&name, color_image(&small), TextureOptions::LINEAR);
             self.textures.insert(name, texture);
         }
         self.is_busy &= !found.are_next;
@@ -167,8 +166,7 @@ fn file_of(folder: &Path, name: &str) -> PathBuf {
 fn read_small(folder: &Path, name: &str) -> Option<Rgb8> {
     let bytes = read_file(&file_of(folder, name)).ok()?;
     let picture = decode_ldr(&bytes, name).ok().filter(|picture| picture.width <= WIDTH)?;
-    let rgba = picture.pixels.rgba();
-    let pixels = rgba.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+    let pixels = picture.pixels.rgba().iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
     Some(Rgb8 { width: picture.width, height: picture.height, pixels })
 }
 

@@ -64,8 +64,7 @@ impl Tasks {
         work: impl FnOnce() -> Result<TaskResult> + Send + 'static,
     ) -> Option<JoinHandle<()>> {
         let [report, refuse] = [(); 2].map(|()| self.reporter());
-        let thread = spawn(name, move || report(work()));
-        thread.map_err(|error| refuse(Err(error))).ok()
+        spawn(name, move || report(work())).map_err(|error| refuse(Err(error))).ok()
     }
 
     /// The same for a file that is written: the end of the window waits for it.
@@ -75,8 +74,7 @@ impl Tasks {
         work: impl FnOnce() -> Result<TaskResult> + Send + 'static,
     ) {
         self.writing.retain(|thread| !thread.is_finished());
-        let thread = self.run(name, work);
-        self.writing.extend(thread);
+        self.writing.extend(self.run(name, work));
     }
 
     /// Waits until all files are written; the failures that have not been reported yet.

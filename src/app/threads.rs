@@ -81,8 +81,7 @@ impl<T> Latest<T> {
                     self.changed.wait(slot).unwrap_or_else(PoisonError::into_inner)
                 }
                 ControlFlow::Continue(Some(time)) => {
-                    let waited = self.changed.wait_timeout(slot, time);
-                    waited.unwrap_or_else(PoisonError::into_inner).0
+                    self.changed.wait_timeout(slot, time).unwrap_or_else(PoisonError::into_inner).0
                 }
             };
         }

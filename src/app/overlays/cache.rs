@@ -21,11 +21,10 @@ pub(super) fn paint(
 ) -> Painted {
     let of = |spot: &Option<Spot>| spot.map(|s| cache.cell_at(s.position, s.normal));
     let cells: Vec<Option<KnownCell>> = surfaces.spots.iter().map(of).collect();
-    let trained = |cell: &KnownCell| cell.samples > 0;
     match overlay {
         Overlay::CacheCells => levels(&cells),
         Overlay::CacheSamples => {
-            let samples = |cell: KnownCell| trained(&cell).then_some(cell.samples as f32);
+            let samples = |cell: KnownCell| (cell.samples > 0).then_some(cell.samples as f32);
             let samples = cells.into_iter().map(|cell| cell.and_then(samples));
             scaled(samples, Range::Logarithmic, "samples a cell")
         }
@@ -33,8 +32,7 @@ pub(super) fn paint(
             let developed = |cell: KnownCell| {
                 look.filter(|_| cell.samples_around > 0).map(|look| develop(cell.radiance, look))
             };
-            let colors = cells.into_iter().map(|c| c.and_then(developed)).collect();
-            Painted::new(colors, Legend::None)
+            Painted::new(cells.into_iter().map(|c| c.and_then(developed)).collect(), Legend::None)
         }
     }
 }
@@ -42,8 +40,7 @@ pub(super) fn paint(
 /// As the picture is developed: white balance, exposure, tone curve.
 fn develop(radiance: Vec3, (look, automatic_ev): (Look, f32)) -> [u8; 3] {
     let balanced = (look.white_balance.matrix() * radiance).max(Vec3::ZERO);
-    let display = look.curve.apply(balanced * look.total_ev(automatic_ev).exp2());
-    srgb8_from_linear(display)
+    srgb8_from_linear(look.curve.apply(balanced * look.total_ev(automatic_ev).exp2()))
 }
 
 fn levels(cells: &[Option<KnownCell>]) -> Painted {

@@ -43,8 +43,7 @@ pub(super) fn of_cells(cells: &[Option<u32>], width: u32) -> Vec<Label> {
     for (i, cell) in cells.iter().enumerate().filter_map(|(i, cell)| Some((i, (*cell)?))) {
         let (sum, count) = middles[&cell];
         let distance = place(i).distance_squared(sum / count);
-        let is_better = best.get(&cell).is_none_or(|(least, _)| distance < *least);
-        if is_better && has_room(i, cell) {
+        if best.get(&cell).is_none_or(|(least, _)| distance < *least) && has_room(i, cell) {
             best.insert(cell, (distance, i));
         }
     }

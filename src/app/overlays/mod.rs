@@ -46,10 +46,9 @@ impl Sources<'_> {
     /// Draws; `None` while what it needs is not there.
     pub(super) fn paint(&self, overlay: Overlay) -> Option<Painted> {
         let pixels = self.snapshot.main.film.pixels().iter();
+        let samples = |pixel: &Pixel| Some(pixel.samples() as f32);
         match overlay {
-            Overlay::Samples => {
-                Some(scaled(pixels.map(|p| Some(p.samples() as f32)), Range::Whole, "samples"))
-            }
+            Overlay::Samples => Some(scaled(pixels.map(samples), Range::Whole, "samples")),
             Overlay::Error => {
                 Some(scaled(pixels.map(relative_error), Range::Logarithmic, "of the luminance"))
             }
@@ -71,8 +70,7 @@ impl Sources<'_> {
         let is_lit = |spot: &&Spot| is_sunlit(world, sun, spot, degrees);
         let color = |spot: &Option<Spot>| spot.as_ref().filter(is_lit).map(|_| SUNLIT);
         let colors: Vec<_> = self.surfaces?.spots.par_iter().map(color).collect();
-        let count = colors.iter().flatten().count();
-        let percent = 100.0 * count as f32 / colors.len().max(1) as f32;
+        let percent = 100.0 * colors.iter().flatten().count() as f32 / colors.len().max(1) as f32;
         let name = format!("sunlit, {percent:.1} % of the pixels");
         Some(Painted::new(colors, Legend::Names(vec![(SUNLIT, name)])))
     }

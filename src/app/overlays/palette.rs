@@ -14,8 +14,7 @@ pub fn viridis(t: f32) -> [u8; 3] {
         [-5.435_456, 4.645_852_6, 26.312_435],
     ];
     let t = t.clamp(0.0, 1.0);
-    let sum = C.iter().rev().fold(Vec3::ZERO, |sum, c| sum * t + Vec3::from(*c));
-    bytes(sum)
+    bytes(C.iter().rev().fold(Vec3::ZERO, |sum, c| sum * t + Vec3::from(*c)))
 }
 
 /// A colour of the given hue (turns), saturation and value, sRGB.

@@ -18,8 +18,7 @@ pub(super) fn preview(ui: &mut Ui, map: &LoadedMap, turn: f32) -> Response {
     let texture = texture(ui, &map.preview);
     // What the map shows at u is seen at u + turn: two pieces that wrap around.
     let turn = turn.rem_euclid(1.0);
-    let split = rect.left() + rect.width() * turn;
-    let (left, right) = rect.split_left_right_at_x(split);
+    let (left, right) = rect.split_left_right_at_x(rect.left() + rect.width() * turn);
     let painter = ui.painter_at(rect);
     let uv = |a: f32, b: f32| Rect::from_min_max(Pos2::new(a, 0.0), Pos2::new(b, 1.0));
     painter.image(texture.id(), left, uv(1.0 - turn, 1.0), Color32::WHITE);

@@ -21,8 +21,7 @@ pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
         .default_width(WIDTH.min(room.x))
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui| {
-            let area = ScrollArea::vertical().max_height(room.y).min_scrolled_height(room.y);
-            area.show(ui, |ui| {
+            ScrollArea::vertical().max_height(room.y).min_scrolled_height(room.y).show(ui, |ui| {
                 ui.add_space(4.0);
                 if room.x < WIDTH {
                     keys(ui);

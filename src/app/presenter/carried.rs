@@ -106,9 +106,8 @@ impl Carried {
     fn keep(&mut self, order: &Order, image: Option<&Arc<Image>>) {
         let snapshot = &*order.snapshot;
         let (request, film) = (&snapshot.request, &snapshot.main.film);
-        let is_kept =
-            snapshot.is_lasting() && request.view.crop.is_none() && film.min_samples() > 0;
-        if !is_kept {
+        let is_part = request.view.crop.is_some();
+        if is_part || !snapshot.is_lasting() || film.min_samples() == 0 {
             return;
         }
         let other = snapshot.backdrop.as_ref().map(|backdrop| &*backdrop.film);
@@ -118,8 +117,7 @@ impl Carried {
         if self.last.as_ref().is_some_and(|last| last.request.view != request.view) {
             self.before = self.last.take();
         }
-        let samples = snapshot.film_samples();
-        self.before.take_if(|before| before.worth(&request.view, samples) == 0.0);
+        self.before.take_if(|before| before.worth(&request.view, snapshot.film_samples()) == 0.0);
         self.last = Whole::new(snapshot, image);
     }
 
@@ -155,8 +153,7 @@ impl Carried {
             if is_over || is_raw || is_compared || is_of_view(&whole) {
                 return own;
             }
-            let seen = whole.keyframe.seen_in(view, Some(film));
-            faded(&seen, image, samples as f32, worth as f32)
+            faded(&whole.keyframe.seen_in(view, Some(film)), image, samples as f32, worth as f32)
         };
         Prepared {
             is_carried: true,

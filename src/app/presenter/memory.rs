@@ -153,9 +153,8 @@ impl Memory {
             }
             None => Ok(source.prepare(&developer, cancel)),
         };
-        let Some(own) = self.uploads.picture.or_try(source.key(), prepare)? else {
-            return Ok(None);
-        };
+        let own = self.uploads.picture.or_try(source.key(), prepare)?;
+        let Some(own) = own else { return Ok(None) };
         let key = (source.key(), order.ahead.as_ref().map(|ahead| Arc::as_ptr(ahead) as usize));
         let complete = || Ok(self.carried.carry(order, own));
         let completed = self.uploads.completed.or_make(key, complete)?;
@@ -211,9 +210,8 @@ impl Memory {
             shown.uncompared = compared.failure.filter(|_| is_final);
         } else if let Some(source) = Source::plain(order) {
             let prepare = || Ok(source.prepare(&developer, cancel));
-            let Some(plain) = self.uploads.plain.or_try(source.key(), prepare)? else {
-                return Ok(None);
-            };
+            let plain = self.uploads.plain.or_try(source.key(), prepare)?;
+            let Some(plain) = plain else { return Ok(None) };
             (shown.other, shown.failure) = (Some(plain.picture), shown.failure.or(plain.failure));
         }
         developer.gpu.check()?;
