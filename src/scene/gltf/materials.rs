@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{Affine2, Vec3, Vec4};
+use glam::{Affine2, Vec3};
 use gltf::json;
 use json::extensions::texture::TextureTransform;
 use json::validation::Checked;

@@ -5,7 +5,7 @@
 //! differ from node to node, since those have shapes of their own; and instances whose place has no
 //! sound inverse ([`bvh::Instance::can_be_walked`]). All of that is baked.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use glam::{DAffine3, Vec3};
 use gltf::json;
