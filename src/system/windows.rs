@@ -23,7 +23,7 @@ use windows_sys::Win32::System::Memory::{
 };
 use windows_sys::Win32::System::SystemInformation::{GlobalMemoryStatusEx, MEMORYSTATUSEX};
 use windows_sys::Win32::System::Threading::{
-    CREATE_NEW_PROCESS_GROUP, GetCurrentProcess, GetCurrentThread, GetThreadTimes,
+    CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW, GetCurrentProcess, GetCurrentThread, GetThreadTimes,
     SetThreadPriority, THREAD_PRIORITY_BELOW_NORMAL, TerminateProcess,
 };
 use windows_sys::Win32::UI::WindowsAndMessaging::{
@@ -181,9 +181,9 @@ impl FileName {
     }
 }
 
-/// Keeps Ctrl-C in this process' console from a process to be started.
+/// Keeps Ctrl-C in this process' console from a process to be started, which gets no window for a console either.
 pub(crate) fn set_apart(command: &mut Command) {
-    command.creation_flags(CREATE_NEW_PROCESS_GROUP);
+    command.creation_flags(CREATE_NEW_PROCESS_GROUP | CREATE_NO_WINDOW);
 }
 
 /// Bytes that the process can get before the machine starts to swap.
