@@ -88,7 +88,7 @@ pub struct App {
     /// Whether the window is to be closed.
     pub(super) is_closing: bool,
     /// Whether it was said that renders would be ended early.
-    is_warned: bool,
+    pub(super) is_warned: bool,
 }
 
 impl App {

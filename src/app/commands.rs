@@ -7,6 +7,7 @@ use glam::Vec2;
 
 use super::document::Viewpoint;
 use super::interface::Purpose;
+use crate::scene::Camera;
 
 /// Something asked for by a panel, a key or a dropped file; the application carries it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +38,8 @@ pub enum Command {
     CopyCommandLine,
     /// Look from here.
     LookFrom(Viewpoint),
+    /// Make a small picture of what a camera sees, if there is none.
+    MakeCameraPicture(Camera),
     /// Keep the present viewpoint.
     Bookmark,
     /// Drop a kept viewpoint.

@@ -32,7 +32,7 @@ use crate::sources;
 use crate::tone::display_rgb8;
 
 /// Why there is nothing to render.
-const NOT_YET: &str = "There is no picture yet";
+const NOT_YET: &str = "The scene is still being read";
 
 impl App {
     /// Carries out a command.
@@ -75,6 +75,7 @@ impl App {
                 Some(words) => {
                     self.library.note_save(&path);
                     self.renders.add(path, words);
+                    self.is_warned = false;
                 }
                 None => self.messages.notice(NOT_YET),
             },
@@ -87,6 +88,13 @@ impl App {
             }
             Command::Copy => self.copy(context),
             Command::LookFrom(viewpoint) => document.viewpoint = Some(viewpoint),
+            Command::MakeCameraPicture(camera) => {
+                let request = self.rendering.snapshot.as_ref().map(|it| &it.request);
+                let pictures = &mut self.rendering.camera_pictures;
+                if let Some(make) = request.and_then(|request| pictures.make(request, camera)) {
+                    self.tasks.run("camera", || make().map(TaskResult::CameraPicture));
+                }
+            }
             Command::Bookmark => self.library.bookmark(document),
             Command::ForgetBookmark(index) => self.library.forget_bookmark(document, index),
             Command::FrameAll => {
@@ -387,7 +395,9 @@ impl App {
         let document = &self.edited.document;
         let scene = &self.assets.scene_of(document)?.world.scene;
         let of_scene = &self.library.history.of_scene;
-        let exposure_ev = self.display.exposure_ev(document)?;
+        let look = &document.look;
+        let own_ev = (!look.auto_exposure).then_some(look.exposure_ev);
+        let exposure_ev = self.display.exposure_ev(document).or(own_ev);
         Some(self.interface.final_render.words(document, scene, of_scene, exposure_ev, path))
     }
 

@@ -45,13 +45,13 @@ pub enum Motion {
 
 impl FinalRender {
     /// Words after `lightgrid` that render the document's picture into a file. `exposure_ev` is in stops, automatic
-    /// ones included.
+    /// ones included; without it the file finds its own.
     pub(crate) fn words(
         &self,
         document: &Document,
         scene: &Scene,
         of_scene: &SceneOptions,
-        exposure_ev: f32,
+        exposure_ev: Option<f32>,
         output: &Path,
     ) -> Vec<String> {
         let Document { light, look, stop, .. } = document;
@@ -97,7 +97,7 @@ impl FinalRender {
             ("bounces", unless(light.bounces, super::document::Light::default().bounces)),
             ("seed", unless(light.seed, 0)),
             ("device", device.map(str::to_owned)),
-            ("exposure", Some(exposure_ev.to_string()).filter(|_| !has_layers)),
+            ("exposure", exposure_ev.filter(|_| !has_layers).map(|stops| stops.to_string())),
             ("tonemap", unless(look.curve, ToneCurve::default()).filter(|_| !has_layers)),
             (
                 "white",

@@ -13,6 +13,7 @@ mod album;
 mod application;
 mod assets;
 mod blit;
+mod camera_pictures;
 pub(crate) mod commands;
 mod comparison;
 pub(crate) mod convergence;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::camera_pictures::CameraPictures;
 use super::convergence::Convergence;
 use super::inspect::Inspector;
 use super::speed_up::SpeedUp;
@@ -17,6 +18,8 @@ const MIN_SAMPLES: u32 = 4;
 pub(super) struct Rendering {
     /// The curves of the error.
     pub(super) convergence: Convergence,
+    /// What the scene's cameras see.
+    pub(super) camera_pictures: CameraPictures,
     /// The place that is looked at.
     pub(super) inspector: Inspector,
     /// The render thread.
@@ -38,6 +41,7 @@ impl Rendering {
     pub(super) fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
         Ok(Self {
             convergence: Convergence::default(),
+            camera_pictures: CameraPictures::default(),
             inspector: Inspector::default(),
             worker: Worker::start(wake, gpu, screen)?,
             snapshot: None,

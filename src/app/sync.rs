@@ -179,6 +179,7 @@ impl App {
                     self.execute(command, context);
                 }
             }
+            TaskResult::CameraPicture(made) => self.rendering.camera_pictures.take(made, context),
             TaskResult::SmallMaps(found) => self.library.small_maps.take(found, context),
             TaskResult::Truth(truth) => self.rendering.inspector.take(truth),
             TaskResult::Done(sentence) => self.messages.notice(sentence),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
+use super::camera_pictures::CameraPicture;
 use super::inspect::Truth;
 use super::kept_picture::KeptPicture;
 use super::small_maps::SmallMapsFound;
@@ -25,6 +26,8 @@ pub(super) enum TaskResult {
     Truth(Truth),
     /// Pictures that earlier windows kept.
     KeptPictures(Vec<KeptPicture>),
+    /// What a camera sees in small.
+    CameraPicture(CameraPicture),
     /// Maps in small.
     SmallMaps(SmallMapsFound),
 }

@@ -105,6 +105,7 @@ fn files_are_rendered_beside_the_window() {
     let path = desk.path("long.png");
     let is_there = [5, 30, 120].map(Duration::from_secs).into_iter().any(|wait| {
         desk.start(&format!("{view} --samples 1000000"));
+        desk.save_until("picture", |_, _| Some(()));
         desk.answer("ctrl+r", "long.png");
         std::thread::sleep(wait);
         desk.xdotool("key ctrl+q");

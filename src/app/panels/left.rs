@@ -20,7 +20,7 @@ use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
 use crate::render::light_groups::MAX_LAMPS;
-use crate::scene::{Frame, Medium, Scene, builtin};
+use crate::scene::{Camera, Frame, Medium, Scene, builtin};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 
 /// Draws the panel.
@@ -122,19 +122,34 @@ fn named(ui: &mut Ui, is_current: bool, small: Option<&TextureHandle>, name: &st
 
 fn cameras(ui: &mut Ui, scope: &mut Scope<'_>) {
     let scene = scope.scene();
-    let Scope { document, commands, .. } = scope;
+    let Scope { document, rendering, commands, .. } = scope;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::Vec2::splat(4.0);
+        let view =
+            |ui: &mut Ui, (name, hint): (&str, &str), camera: Camera, commands: &mut Vec<_>| {
+                let button = ui.button(name);
+                if button.hovered() {
+                    commands.push(Command::MakeCameraPicture(camera.clone()));
+                }
+                button.on_hover_ui(|ui| {
+                    if let Some(texture) = rendering.camera_pictures.of(&camera) {
+                        ui.image((texture.id(), texture.size_vec2()));
+                    }
+                    ui.label(hint);
+                })
+            };
         for (i, camera) in scene.iter().flat_map(|s| s.world.scene.cameras.iter()).enumerate() {
             let own = Some(camera.name.clone()).filter(|name| !name.is_empty());
             let name = own.unwrap_or_else(|| format!("Camera {}", i + 1));
             let distance = document.viewpoint.as_ref().map_or(3.0, |v| v.pivot_distance);
-            let command = Command::LookFrom(Viewpoint::of(camera, distance));
-            button(ui, (&name, "Look through this camera of the scene"), commands, command);
+            let hint = "Look through this camera of the scene";
+            if view(ui, (&name, hint), camera.clone(), commands).clicked() {
+                commands.push(Command::LookFrom(Viewpoint::of(camera, distance)));
+            }
         }
         for (i, viewpoint) in document.bookmarks.iter().enumerate() {
-            let button = ui.button(viewpoint.name.clone());
-            let button = button.on_hover_text("Click: go to this view. Right click: delete it");
+            let hint = "Click: go to this view. Right click: delete it";
+            let button = view(ui, (&viewpoint.name, hint), viewpoint.camera(), commands);
             if button.clicked() {
                 commands.push(Command::LookFrom(viewpoint.clone()));
             }

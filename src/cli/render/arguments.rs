@@ -513,7 +513,7 @@ mod tests {
         ) -> RenderArguments {
             let options = SceneOptions { hide: vec!["a b".to_owned()], ..SceneOptions::default() };
             let to = Path::new(to);
-            let words = final_render.words(document, &world.scene, &options, -1.5, to);
+            let words = final_render.words(document, &world.scene, &options, Some(-1.5), to);
             let line = Line::try_parse_from(&words).map_err(|error| format!("{words:?}: {error}"));
             line.expect("words that are understood").arguments
         }
