@@ -72,7 +72,7 @@ const MAX_METHODS: usize = 40;
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11577),
+    ("app", 11693),
     ("bench", 445),
     ("bsdf", 1476),
     ("bvh", 1365),
