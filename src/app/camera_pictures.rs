@@ -21,7 +21,7 @@ use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 /// Pixels across and down.
 const SIZE: [u32; 2] = [144, 90];
 /// Samples a pixel.
-const SAMPLES: u32 = 2;
+const SAMPLES: u32 = 4;
 
 /// Small pictures of one scene in one light.
 #[derive(Default)]
