@@ -8,14 +8,12 @@ use glam::{DVec3, Vec3};
 use super::document::{Document, Viewpoint, called};
 use crate::denoise::Denoiser;
 use crate::image::extension;
-use crate::path::Background;
+use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
+use crate::scene::camera_path::FRAMES_PER_SECOND;
 use crate::scene::{Camera, LampEdit, Lamps, Outlines, Scene, SceneOptions};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 use crate::tone::{ToneCurve, WhiteBalance};
-
-/// Frames per second of a movement, as `render` has them by default.
-const FRAMES_PER_SECOND: f64 = 24.0;
 
 with_defaults! {
     /// Size and movement of a final render; all else is as in the window.
@@ -94,7 +92,7 @@ impl FinalRender {
             ("seconds", stop.seconds.map(|seconds| seconds.to_string())),
             ("noise", stop.noise.map(|noise| noise.to_string())),
             ("sampling", unless(light.sampling, Default::default())),
-            ("bounces", unless(light.bounces, super::document::Light::default().bounces)),
+            ("bounces", unless(light.bounces, PathLimits::default().bounces)),
             ("seed", unless(light.seed, 0)),
             ("device", device.map(str::to_owned)),
             ("exposure", exposure_ev.filter(|_| !has_layers).map(|stops| stops.to_string())),

@@ -27,8 +27,12 @@ pub(crate) enum Search {
 
 impl Table {
     /// Builds a table and, from that table's own sums, the tiles' energies.
-    pub(crate) fn build(of: TableKind, weights: &Weights<'_>, grid: &TileGrid) -> (Self, Vec<f64>) {
-        let table = match of {
+    pub(crate) fn build(
+        kind: TableKind,
+        weights: &Weights<'_>,
+        grid: &TileGrid,
+    ) -> (Self, Vec<f64>) {
+        let table = match kind {
             TableKind::TileLocal => {
                 let (table, energies) = TileLocal::build(weights, grid);
                 return (Self::TileLocal(table), energies);
@@ -52,8 +56,13 @@ impl Table {
 
     /// Chooses the patch that was searched for in a tile; `None` where the table has no mass.
     #[inline]
-    pub(crate) fn finish(&self, grid: &TileGrid, tile: u32, begun: &Search) -> Option<PatchSample> {
-        match (self, begun) {
+    pub(crate) fn finish(
+        &self,
+        grid: &TileGrid,
+        tile: u32,
+        search: &Search,
+    ) -> Option<PatchSample> {
+        match (self, search) {
             (Self::TileLocal(table), Search::TileLocal(search)) => Some(table.finish(search)),
             (Self::SummedArea(table), Search::SummedArea(u)) => {
                 // 48 bits of each.

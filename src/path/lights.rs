@@ -159,8 +159,8 @@ impl LocalLights {
         })
     }
 
-    /// Density in solid angle with which [`Self::sample`] chooses a point of `triangle` that lies on this
-    /// `way`, a unit direction and so many metres; 0 if it is not a light.
+    /// Pdf in solid angle of [`Self::sample`] for the point of `triangle` at the end of `way`: a unit direction and a
+    /// distance in metres from the receiver. 0 if the triangle is not a light.
     pub fn sample_pdf_solid_angle(
         &self,
         scene: &Scene,

@@ -188,8 +188,8 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 const FIRST_SHARE: f64 = 1.0 / 256.0;
 
 impl Run {
-    /// Computes the errors of its pictures and of the denoised ones, one for each point, against a reference of so many
-    /// pictures.
+    /// Computes the errors of its pictures and of the denoised ones, one for each point, against a reference, which
+    /// comes with the number of pictures that it is the mean of, where that is known.
     ///
     /// # Errors
     /// If the reference is black or a picture is not finite.

@@ -2,6 +2,9 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 
+/// Frames per second of a movement, where nobody asks for others.
+pub const FRAMES_PER_SECOND: f64 = 24.0;
+
 /// The movement of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraPath {

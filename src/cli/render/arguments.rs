@@ -18,6 +18,7 @@ use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
+use crate::scene::camera_path::FRAMES_PER_SECOND;
 use crate::scene::{Camera, Medium, Scene, builtin};
 
 /// Arguments of `render`.
@@ -202,7 +203,7 @@ pub(in crate::cli) struct RenderArguments {
     /// Outputs are out.####.png, or .mp4, .webm and .gif by ffmpeg. Frame N is at N / fps seconds.
     #[arg(long, value_parser = values::frames, value_name = "A..B", help_heading = "Frames")]
     pub(super) frames: Option<RangeInclusive<u32>>,
-    /// Turns the camera once in so many frames about the vertical through --about or --target; without them, through
+    /// Turns the camera once in N frames. The axis is the vertical through --about or --target; without them, through
     /// what the middle of the picture shows or, in a room, the camera itself.
     #[arg(long, value_parser = values::whole::<u32>(1..=100_000), value_name = "N", help_heading = "Frames")]
     pub(super) turntable: Option<u32>,
@@ -210,7 +211,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_parser = values::vector, requires = "turntable", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Frames")]
     pub(super) about: Option<DVec3>,
     /// Frames per second.
-    #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]
+    #[arg(long, default_value_t = FRAMES_PER_SECOND, value_parser = values::positive, value_name = "F", help_heading = "Frames")]
     pub(super) fps: f64,
     /// A frame of a video, which nobody asked for by name.
     #[arg(skip)]

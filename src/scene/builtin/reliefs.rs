@@ -7,8 +7,13 @@ use crate::noise::tiling_fbm;
 use crate::scene::TextureImage;
 
 /// The normal map of `height(u, v)` in metres over a texture that covers `size` metres and repeats.
-fn relief(width: u32, height: u32, size: Vec2, f: impl Fn(Vec2) -> f32 + Sync) -> TextureImage {
-    let heights = texel_by_texel([width, height], |uv, _| f(uv));
+fn relief(
+    width: u32,
+    height: u32,
+    size: Vec2,
+    surface: impl Fn(Vec2) -> f32 + Sync,
+) -> TextureImage {
+    let heights = texel_by_texel([width, height], |uv, _| surface(uv));
     let at = |x: u32, y: u32| heights[((y % height) * width + x % width) as usize];
     // Central differences over two texels.
     let scale = 0.5 * Vec2::new(width as f32, height as f32) / size;

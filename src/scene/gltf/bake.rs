@@ -81,10 +81,15 @@ fn append_vertices(scene: &mut Scene, part: &Part) -> usize {
     first
 }
 
-fn append(scene: &mut Scene, part: &Part, of: impl Fn(usize) -> Placing, mirrors: bool) -> usize {
+fn append(
+    scene: &mut Scene,
+    part: &Part,
+    placing: impl Fn(usize) -> Placing,
+    mirrors: bool,
+) -> usize {
     let first = append_vertices(scene, part);
     for vertex in 0..part.positions.len() {
-        let placing = of(vertex);
+        let placing = placing(vertex);
         let position = &mut scene.positions[first + vertex];
         *position = placing.position(*position);
         if let Some(normal) = scene.normals.get_mut(first + vertex) {

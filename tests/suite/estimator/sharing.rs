@@ -42,7 +42,7 @@ fn render(world: &World, environment: &Environment, view: View, samples: u32) ->
     session.film().clone()
 }
 
-/// Pictures of so many seeds.
+/// Pictures of one view, each with a seed of its own.
 struct Pictures(Vec<Film>);
 
 impl Pictures {
