@@ -1,5 +1,5 @@
 // From sums of radiance to a picture for a display. Twin of `src/tone.rs` and
-// `src/tone/white_balance.rs`; the CPU's results and these differ by one 8-bit level at most.
+// what is in `src/tone`; the CPU's results and these differ by one 8-bit level at most.
 
 struct Develop {
     // White balance, linear Rec.709 to the same.
@@ -17,6 +17,9 @@ struct Develop {
     has_overlay: u32,
     // Factor from the film's sums to those of radiance.
     unscale: f32,
+    // Entries along a side of `look`, 0 without one, and its share.
+    look_side: u32,
+    look_strength: f32,
 }
 
 // Not a uniform: software Vulkan compiles a shader anew for each value that it branches on, and keeps that.
@@ -26,6 +29,8 @@ struct Develop {
 @group(0) @binding(4) var overlay: texture_2d<f32>;
 @group(0) @binding(5) var display: texture_storage_2d<rgba8unorm, write>;
 @group(0) @binding(6) var<storage, read_write> small: array<vec4f>;
+// Colours over sRGB ones, red fastest.
+@group(0) @binding(7) var<storage, read> look: array<vec4f>;
 
 // Beyond what any curve tells from white, and small enough that its square is finite.
 const BRIGHTEST = 1e6;
@@ -144,6 +149,28 @@ fn srgb_from_linear(x: f32) -> f32 {
     return select(12.92 * x, 1.055 * power(x, 1.0 / 2.4) - 0.055, x > 0.0031308);
 }
 
+// The look of an sRGB colour, linear within the tetrahedra of the table's cells.
+fn graded(rgb: vec3f) -> vec3f {
+    let side = settings.look_side;
+    if side == 0u {
+        return rgb;
+    }
+    let place = clamp(rgb, vec3f(), vec3f(1.0)) * f32(side - 1u);
+    let corner = min(floor(place), vec3f(f32(side - 2u)));
+    let t = place - corner;
+    let step = vec3u(1u, side, side * side);
+    let at = dot(vec3u(corner), step);
+    let all = step.x + step.y + step.z;
+    let greatest = max(t.x, max(t.y, t.z));
+    let least = min(t.x, min(t.y, t.z));
+    let middle = t.x + t.y + t.z - greatest - least;
+    let first = select(select(step.z, step.y, t.y == greatest), step.x, t.x == greatest);
+    let last = select(select(step.z, step.y, t.y == least), step.x, t.x == least);
+    let color = look[at] * (1.0 - greatest) + look[at + first] * (greatest - middle)
+        + look[at + all - last] * (middle - least) + look[at + all] * least;
+    return mix(rgb, color.xyz, settings.look_strength);
+}
+
 fn quantise(value: f32, dither: f32) -> f32 {
     let level = value * 255.0;
     let nearest = round(level);
@@ -170,10 +197,12 @@ fn develop(@builtin(global_invocation_id) id: vec3u) {
     }
     let light = tone(balanced(radiance(id.xy)) * settings.gain);
     let dither = gradient_noise(id.xy);
+    let encoded = vec3f(
+        srgb_from_linear(light.x), srgb_from_linear(light.y), srgb_from_linear(light.z),
+    );
+    let color = graded(encoded);
     var level = vec3f(
-        quantise(srgb_from_linear(light.x), dither),
-        quantise(srgb_from_linear(light.y), dither),
-        quantise(srgb_from_linear(light.z), dither),
+        quantise(color.x, dither), quantise(color.y, dither), quantise(color.z, dither),
     );
     if settings.has_overlay != 0u {
         level = blended(level, id.xy);

@@ -1,5 +1,6 @@
-//! From linear radiance to 8-bit pictures for a display: exposure, tone curve, sRGB, dither.
+//! From linear radiance to 8-bit pictures for a display: exposure, tone curve, sRGB, look, dither.
 
+mod lut;
 mod white_balance;
 
 use std::fmt;
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::color::{luminance, srgb_from_linear};
 use crate::image::{Image, Rgb8};
 
+pub use lut::{Grade, Lut};
 pub use white_balance::{DAYLIGHT_KELVIN, KELVIN, TINT, WhiteBalance};
 
 /// Curve from exposed radiance to display light in `[0,1]`.
@@ -58,12 +60,35 @@ impl ToneCurve {
 /// Maximum of a channel: white in every curve, and its square is finite.
 const BRIGHTEST: f32 = 1e6;
 
-/// The 8-bit sRGB picture of `image * 2^exposure_ev` under a tone curve.
+/// A tone curve, and the look of what it gives.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tone {
+    /// The curve.
+    pub curve: ToneCurve,
+    /// The look, if there is one.
+    pub grade: Option<Grade>,
+}
+
+impl From<ToneCurve> for Tone {
+    fn from(curve: ToneCurve) -> Self {
+        Self { curve, grade: None }
+    }
+}
+
+impl Tone {
+    /// Display colour of exposed linear Rec.709, in sRGB's encoding, `[0,1]`.
+    pub(crate) fn apply(&self, rgb: Vec3) -> Vec3 {
+        let encoded = Vec3::from(self.curve.apply(rgb).to_array().map(srgb_from_linear));
+        self.grade.as_ref().map_or(encoded, |grade| grade.apply(encoded))
+    }
+}
+
+/// The 8-bit sRGB picture of `image * 2^exposure_ev` under a tone curve and a look.
 ///
 /// Rounding is dithered by interleaved gradient noise (Jimenez 2014), the same for all channels and
 /// pictures, so that skies show no bands; values that need no rounding are exact.
-pub fn display_rgb8(image: &Image, exposure_ev: f32, curve: ToneCurve) -> Rgb8 {
-    let gain = exposure_ev.exp2();
+pub fn display_rgb8(image: &Image, exposure_ev: f32, tone: impl Into<Tone>) -> Rgb8 {
+    let (gain, tone) = (exposure_ev.exp2(), tone.into());
     let width = image.width as usize;
     let pixels = image
         .pixels
@@ -71,8 +96,7 @@ pub fn display_rgb8(image: &Image, exposure_ev: f32, curve: ToneCurve) -> Rgb8 {
         .enumerate()
         .map(|(i, &rgb)| {
             let dither = gradient_noise((i % width) as f32, (i / width) as f32);
-            let display = curve.apply(Vec3::from(rgb) * gain);
-            display.to_array().map(|v| quantise(srgb_from_linear(v), dither))
+            tone.apply(Vec3::from(rgb) * gain).to_array().map(|v| quantise(v, dither))
         })
         .collect();
     Rgb8 { width: image.width, height: image.height, pixels }

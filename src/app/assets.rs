@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::document::{Document, Viewpoint};
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
+use super::looks::Looks;
 use super::reload::Reload;
 use super::worker::Reference;
 use crate::environment::Environment;
@@ -28,6 +29,8 @@ pub(super) struct Assets {
     /// It, turned and scaled as the document says: what it was made from, rotation in degrees and intensity, and what
     /// that gave.
     transformed: Option<(Arc<Environment>, [f32; 2], Arc<Environment>)>,
+    /// Looks that were read.
+    pub(super) looks: Looks,
     /// What errors are measured against.
     pub(super) reference: Option<Arc<Reference>>,
     /// What was shown when it came.
@@ -37,8 +40,8 @@ pub(super) struct Assets {
 impl Assets {
     /// Of a loader that is at work, and of what looks at files, if they are to be looked at.
     pub(super) fn new(loader: Loader, reload: Option<Reload>) -> Self {
-        let (scene, map, transformed) = (None, None, None);
-        Self { loader, reload, scene, map, transformed, reference: None, reference_of: None }
+        let (scene, map, transformed, looks) = (None, None, None, Looks::default());
+        Self { loader, reload, scene, map, transformed, looks, reference: None, reference_of: None }
     }
 
     /// The scene that the document names, if it is there.

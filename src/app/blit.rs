@@ -206,7 +206,7 @@ mod tests {
         let settings = DevelopSettings {
             white_balance: WhiteBalance::default(),
             exposure_ev: 0.0,
-            curve: ToneCurve::None,
+            tone: ToneCurve::None.into(),
             opacity: [0.0; 2],
         };
         let display = DisplayTexture::new(gpu, [16, 8]);

@@ -16,6 +16,8 @@ pub enum Command {
     OpenScene(String),
     /// Light with another map: a file or a built-in sky.
     OpenMap(String),
+    /// Lay a look over the picture: a `.cube` file.
+    OpenLook(String),
     /// Read the files of scene and map again: another program may have written them.
     ReadAgain,
     /// Give up what is being loaded.

@@ -146,6 +146,7 @@ impl Purpose {
             Self::Map if sources::is_scene(path) => Command::OpenScene(path.to_owned()),
             Self::Scene => Command::OpenScene(path.to_owned()),
             Self::Map => Command::OpenMap(path.to_owned()),
+            Self::Look => Command::OpenLook(path.to_owned()),
             Self::Picture => Command::Save(path.into()),
             Self::Render | Self::RenderFrames => Command::Render(path.into()),
             Self::Distributions => Command::Export(path.into()),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::comparison::Comparison;
-use super::document::{Document, Look};
+use super::document::Document;
 use super::overlays::Overlay;
 use super::presenter::{Order, Presenter, Shown};
 use super::screen::{Developed, Screen};
@@ -14,6 +14,7 @@ use crate::environment::sun::Sun;
 use crate::error::Result;
 use crate::image::Rgb8;
 use crate::scene::Camera;
+use crate::tone::Tone;
 
 /// Developed pictures.
 #[derive(Default)]
@@ -77,6 +78,7 @@ impl Display {
         (snapshot, latest): (&Arc<Snapshot>, Option<Arc<Request>>),
         document: &Document,
         (overlay, tile, sun): (Option<Overlay>, Option<u32>, Option<Sun>),
+        tone: Tone,
         compared: Option<Comparison>,
     ) {
         let look = &document.look;
@@ -94,7 +96,7 @@ impl Display {
             denoiser: look.denoise.then(|| look.denoiser.found()),
             metered: look.auto_exposure.then_some(look.white_balance),
             overlay,
-            look: overlay.filter(|o| o.is_developed()).map(|_| *look),
+            look: overlay.filter(|o| o.is_developed()).map(|_| (look.clone(), tone)),
             tile,
             sun: sun.filter(|_| overlay == Some(Overlay::Sun)),
             compared,
@@ -113,8 +115,13 @@ impl Display {
     }
 
     /// How the picture is developed under overlays of this opacity, once the exposure is known.
-    pub(super) fn settings(&self, document: &Document, opacity: f32) -> Option<DevelopSettings> {
-        let Look { white_balance, curve, .. } = document.look;
+    pub(super) fn settings(
+        &self,
+        document: &Document,
+        tone: Tone,
+        opacity: f32,
+    ) -> Option<DevelopSettings> {
+        let white_balance = document.look.white_balance;
         let opacity = match self.shown.as_ref().and_then(|shown| shown.order.overlay) {
             Some(overlay) if overlay.is_opaque() => [1.0, 0.6],
             Some(Overlay::Sun) => [0.6 * opacity, 0.0],
@@ -122,7 +129,7 @@ impl Display {
             _ => [opacity, 0.6 * opacity],
         };
         let exposure_ev = self.exposure_ev(document)?;
-        Some(DevelopSettings { white_balance, exposure_ev, curve, opacity })
+        Some(DevelopSettings { white_balance, exposure_ev, tone, opacity })
     }
 
     /// The picture as it is on the screen, overlay included, if there is one.

@@ -82,7 +82,8 @@ with_defaults! {
 
 with_defaults! {
     /// How linear radiance becomes a picture; nothing of it restarts rendering.
-    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
     pub struct Look {
         /// Whether the exposure follows the picture; `exposure_ev` is added to it then.
         pub auto_exposure: bool = true,
@@ -90,12 +91,15 @@ with_defaults! {
         pub exposure_ev: f32 = 0.0,
         /// Tone curve.
         pub curve: ToneCurve = ToneCurve::Agx,
+        /// What is laid over that: a `.cube` file or a built-in look.
+        pub lut: Option<String> = None,
+        /// Its share, `[0,1]`.
+        pub lut_strength: f32 = 1.0,
         /// The light that looks white.
         pub white_balance: WhiteBalance = WhiteBalance::default(),
         /// Whether noise is filtered out for display and 8-bit pictures.
         pub denoise: bool = true,
         /// What filters it out.
-        #[serde(default)]
         pub denoiser: Denoiser = Denoiser::default(),
     }
 }

@@ -14,7 +14,8 @@ use crate::sources;
 pub(super) struct Dropped {
     pub(super) scene: Option<String>,
     pub(super) map: Option<String>,
-    /// Other scenes and maps.
+    pub(super) look: Option<String>,
+    /// Other scenes, maps and looks.
     pub(super) left: Vec<String>,
 }
 
@@ -23,14 +24,15 @@ impl Dropped {
     /// buffers may come along.
     pub(super) fn of(paths: &[PathBuf]) -> Self {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        let (looks, names): (Vec<_>, Vec<_>) = names.into_iter().partition(|name| is_look(name));
         let (scenes, others): (Vec<_>, Vec<_>) =
             names.into_iter().partition(|name| sources::is_scene(name));
         let has_scene = !scenes.is_empty();
         // What else comes with a scene is read with it.
         let maps = others.into_iter().filter(|name| !has_scene || is_map(name));
-        let (mut scenes, mut maps) = (scenes.into_iter(), maps);
-        let (scene, map) = (scenes.next(), maps.next());
-        Self { scene, map, left: scenes.chain(maps).collect() }
+        let (mut scenes, mut maps, mut looks) = (scenes.into_iter(), maps, looks.into_iter());
+        let (scene, map, look) = (scenes.next(), maps.next(), looks.next());
+        Self { scene, map, look, left: scenes.chain(maps).chain(looks).collect() }
     }
 }
 
@@ -39,7 +41,12 @@ pub(super) fn is_map(name: &str) -> bool {
     matches!(extension(Path::new(name)).as_deref(), Some("exr" | "hdr"))
 }
 
-/// Files dropped onto the window: one scene and one map of them are opened. With a scene come files that belong
+/// Whether a file is named as a look.
+pub(super) fn is_look(name: &str) -> bool {
+    extension(Path::new(name)).as_deref() == Some("cube")
+}
+
+/// Files dropped onto the window: one scene, one map and one look of them are opened. With a scene come files that belong
 /// to it, pictures among them, of which none but those in linear radiance are taken for maps.
 pub(super) fn dropped_files(
     context: &egui::Context,
@@ -59,7 +66,8 @@ pub(super) fn dropped_files(
         messages.notice(format!("Not opened: {}", left.join(", ")));
     }
     let scene = chosen.scene.map(Command::OpenScene);
-    scene.into_iter().chain(chosen.map.map(Command::OpenMap)).collect()
+    let map = chosen.map.map(Command::OpenMap);
+    scene.into_iter().chain(map).chain(chosen.look.map(Command::OpenLook)).collect()
 }
 
 #[cfg(test)]
@@ -71,9 +79,9 @@ mod tests {
         let dropped =
             |names: &[&str]| Dropped::of(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
         let some = |name: &str| Some(name.to_owned());
-        let all = dropped(&["room.gltf", "room.bin", "oak.png", "sky.hdr"]);
-        let both = Dropped { scene: some("room.gltf"), map: some("sky.hdr"), left: Vec::new() };
-        assert_eq!(all, both, "textures are no skies");
+        let found = dropped(&["room.gltf", "room.bin", "oak.png", "sky.hdr", "Film.CUBE"]);
+        let [scene, map, look] = ["room.gltf", "sky.hdr", "Film.CUBE"].map(some);
+        assert_eq!(found, Dropped { scene, map, look, left: Vec::new() }, "textures are no skies");
         assert_eq!(dropped(&["street.jpg"]).map, some("street.jpg"));
         let two = dropped(&["a.exr", "b.exr"]);
         assert_eq!((two.map, two.left), (some("a.exr"), vec!["b.exr".to_owned()]));

@@ -16,7 +16,7 @@ use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
 use super::overlays::Overlay;
 use super::screen::color_image;
-use super::settings_file::lasting_scene;
+use super::settings_file::{lasting_map, lasting_scene};
 use super::sync::stay_in_scene;
 use super::tasks::TaskResult;
 use super::worker::{Activity, Reference, Snapshot};
@@ -29,7 +29,7 @@ use crate::render::sun_placement::SunPlacement;
 use crate::render::surface_map::look_at_place;
 use crate::scene::{LampEdits, builtin};
 use crate::sources;
-use crate::tone::display_rgb8;
+use crate::tone::{Lut, display_rgb8};
 
 /// Why there is nothing to render.
 const NOT_YET: &str = "The scene is still being read";
@@ -61,6 +61,11 @@ impl App {
             }
             Command::ToggleReloads => self.library.settings.reloads ^= true,
             Command::Ask(purpose) => self.ask(purpose),
+            Command::OpenLook(name) => {
+                let name = if Lut::is_built_in(&name) { name } else { lasting_map(&name) };
+                self.assets.looks.forget(&name);
+                document.look.lut = Some(name);
+            }
             Command::OpenReference(name) => {
                 self.tasks.run("reference", move || {
                     let image = read_picture(Path::new(&name))?;
@@ -314,7 +319,7 @@ impl App {
         let look = &document.look;
         let small = look.white_balance.apply(image.shrunk(SMALL_WIDTH));
         let exposure_ev = self.display.exposure_ev(document).unwrap_or_default();
-        let small = display_rgb8(&small, exposure_ev, look.curve);
+        let small = display_rgb8(&small, exposure_ev, self.assets.looks.tone(look));
         let (index, failure) = self.library.history.keep(summary, &image, document.clone(), small);
         self.messages.failure(failure);
         self.interface.compared = Chosen { left: Some(index), ..Chosen::default() };
@@ -373,6 +378,7 @@ impl App {
             return None;
         }
         Some(save::Picture {
+            tone: self.assets.looks.tone(&self.edited.document.look),
             snapshot: Arc::clone(snapshot),
             exposure_ev: self.display.exposure_ev(&self.edited.document)?,
             document: self.edited.document.clone(),

@@ -13,7 +13,7 @@ use crate::render::gpu::DeviceChoice;
 use crate::scene::camera_path::FRAMES_PER_SECOND;
 use crate::scene::{Camera, LampEdit, Lamps, Outlines, Scene, SceneOptions};
 use crate::sources::{is_built_in_map, is_built_in_scene};
-use crate::tone::{ToneCurve, WhiteBalance};
+use crate::tone::{Lut, ToneCurve, WhiteBalance};
 
 with_defaults! {
     /// Size and movement of a final render; all else is as in the window.
@@ -80,6 +80,7 @@ impl FinalRender {
             DeviceChoice::Gpu => Some("gpu"),
         };
         let white = look.white_balance;
+        let lut = look.lut.as_ref().filter(|_| !has_layers);
         let options = [
             ("env", Some(name(&document.map, is_built_in_map))),
             ("env-rotation", unless(document.rotation_degrees, 0.0)),
@@ -97,6 +98,8 @@ impl FinalRender {
             ("device", device.map(str::to_owned)),
             ("exposure", exposure_ev.filter(|_| !has_layers).map(|stops| stops.to_string())),
             ("tonemap", unless(look.curve, ToneCurve::default()).filter(|_| !has_layers)),
+            ("look", lut.map(|lut| name(lut, Lut::is_built_in))),
+            ("look-strength", lut.and_then(|_| unless(look.lut_strength, 1.0))),
             (
                 "white",
                 (white != WhiteBalance::default() && !has_layers)

@@ -181,6 +181,8 @@ pub enum Purpose {
     Scene,
     /// A map to open.
     Map,
+    /// A look to open.
+    Look,
     /// A picture to write.
     Picture,
     /// A picture to be rendered into a file.
@@ -201,6 +203,7 @@ impl Purpose {
         match self {
             Self::Scene => ("Open a scene", "glTF scene", &["gltf", "glb"]),
             Self::Map => ("Open a map", "Map", MAPS),
+            Self::Look => ("Open a look", "Look", &["cube"]),
             Self::Picture => ("Save the picture", "Picture", &["png", "exr"]),
             Self::Render => ("Render into a file", "Picture", &["png", "exr"]),
             Self::RenderFrames => {
@@ -215,7 +218,7 @@ impl Purpose {
 
     /// Whether they are written.
     pub fn is_output(self) -> bool {
-        !matches!(self, Self::Scene | Self::Map | Self::Reference)
+        !matches!(self, Self::Scene | Self::Map | Self::Look | Self::Reference)
     }
 }
 

@@ -32,6 +32,7 @@ pub mod interface;
 pub(crate) mod kept_picture;
 mod library;
 pub(crate) mod loader;
+mod looks;
 pub(crate) mod messages;
 mod navigation;
 pub mod overlays;

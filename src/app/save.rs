@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::image::check_writable;
 use crate::output::record::{Phases, Record, settings_of};
 use crate::output::{self, Exposure, Films, LayerName, PictureOptions, write_picture};
+use crate::tone::Tone;
 
 /// What a picture is written from.
 pub(super) struct Picture {
@@ -26,6 +27,8 @@ pub(super) struct Picture {
     pub(super) scene: LoadedScene,
     /// The map.
     pub(super) map: LoadedMap,
+    /// How it is developed.
+    pub(super) tone: Tone,
 }
 
 /// Where the picture is to be written once it has its full size.
@@ -88,7 +91,7 @@ fn write(path: &Path, picture: &Picture) -> Result<()> {
     };
     let options = PictureOptions {
         exposure: Exposure::Stops(picture.exposure_ev),
-        tone_curve: document.look.curve,
+        tone: picture.tone.clone(),
         denoiser: document.look.denoise.then_some(document.look.denoiser),
         white_balance: document.look.white_balance,
         layers: vec![LayerName::All, LayerName::Denoised],

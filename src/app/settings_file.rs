@@ -133,6 +133,7 @@ impl Settings {
         self.viewpoints.iter_mut().for_each(|of| of.viewpoints.retain(Viewpoint::is_sound));
         let (look, usual) = (&mut self.look, &default.look);
         look.exposure_ev = finite(look.exposure_ev, usual.exposure_ev).clamp(-64.0, 64.0);
+        look.lut_strength = finite(look.lut_strength, usual.lut_strength).clamp(0.0, 1.0);
         let (balance, usual) = (&mut look.white_balance, &usual.white_balance);
         balance.kelvin = finite(balance.kelvin, usual.kelvin).clamp(*KELVIN.start(), *KELVIN.end());
         balance.tint = finite(balance.tint, usual.tint).clamp(*TINT.start(), *TINT.end());
@@ -158,7 +159,7 @@ impl Settings {
 
     /// The document a new window starts from.
     pub fn document(&self) -> Document {
-        let Self { look, light, size, stop, .. } = *self;
+        let Self { look, light, size, stop, .. } = self.clone();
         Document { look, light, size, stop, ..Document::default() }
     }
 
@@ -166,7 +167,7 @@ impl Settings {
     /// said was for that window alone.
     pub fn remember(&mut self, document: &Document, start: &Document, interface: &Interface) {
         let shared = |of: &Document| {
-            let Document { look, light, size, stop, .. } = *of;
+            let Document { look, light, size, stop, .. } = of.clone();
             serde_json::to_value(Self { look, light, size, stop, ..Self::default() })
         };
         let values = shared(start).and_then(|before| Ok((before, shared(document)?)));
@@ -290,7 +291,7 @@ fn user_folder([variable, folder, on_macos, on_windows]: [&str; 4]) -> Option<Pa
 
 /// Whether what a document shares with the settings are values a window can work with.
 pub(super) fn is_within_bounds(document: &Document) -> bool {
-    let Document { look, light, size, stop, .. } = *document;
+    let Document { look, light, size, stop, .. } = document.clone();
     let settings = Settings { look, light, size, stop, ..Settings::default() };
     settings == settings.clone().within_bounds()
 }

@@ -98,7 +98,7 @@ impl SmallMaps {
         move || {
             let small = in_small(&preview);
             write_small(folder.as_deref().filter(|_| is_kept), &name, &small);
-            let listed = maps_beside(&name);
+            let listed = files_beside(&name, is_map);
             let known = read_known(folder.as_deref(), &listed).filter(|(known, _)| *known != name);
             let maps = known.chain([(name.clone(), small)]).collect();
             SmallMapsFound { maps, listed: Some(listed), are_next: false }
@@ -126,12 +126,12 @@ impl SmallMaps {
     }
 }
 
-/// Maps in the folder of this one, by name.
-fn maps_beside(name: &str) -> Vec<String> {
+/// Files of a kind in the folder of this one, by name.
+pub(super) fn files_beside(name: &str, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
     let entries = Path::new(name).parent().map(std::fs::read_dir);
     let files = entries.into_iter().flatten().flatten().flatten().map(|entry| entry.path());
     let names = files.filter_map(|path| Some(path.to_str()?.to_owned()));
-    let mut names: Vec<String> = names.filter(|name| is_map(name)).collect();
+    let mut names: Vec<String> = names.filter(|name| is_wanted(name)).collect();
     names.sort_by_key(|name| name.to_lowercase());
     names.truncate(MAX_LISTED);
     names

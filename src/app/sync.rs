@@ -53,6 +53,9 @@ impl App {
         while let Ok(result) = self.tasks.receiver.try_recv() {
             self.take_result(result, context);
         }
+        if let Some(read) = self.assets.looks.read(&self.edited.document.look) {
+            self.tasks.run("look", || Ok(TaskResult::Look(read())));
+        }
         for kind in self.assets.changed(&self.edited.document, self.library.settings.reloads) {
             self.interface.paused &= !self.assets.read_again(kind, &self.edited.document);
         }
@@ -188,6 +191,15 @@ impl App {
                 let count = self.library.history.take_over(earlier);
                 self.interface.compared.shift(count);
             }
+            TaskResult::Look(look) => {
+                let name = look.name.clone();
+                if let Err(error) = self.assets.looks.take(look) {
+                    self.messages.error(error.to_string());
+                    self.edited.put_back(|document| {
+                        document.look.lut.take_if(|lut| *lut == name);
+                    });
+                }
+            }
             TaskResult::Reference(reference) => {
                 let (name, image) = (&reference.name, &reference.image);
                 self.messages.notice(format!(
@@ -271,7 +283,8 @@ impl App {
             let overlay = self.interface.overlay_at(context.time());
             let sun = self.assets.map.as_ref().and_then(|map| map.sun);
             let drawn = (overlay, self.interface.tile, sun);
-            self.display.order((snapshot, latest), document, drawn, compared);
+            let tone = self.assets.looks.tone(&document.look);
+            self.display.order((snapshot, latest), document, drawn, tone, compared);
         }
     }
 

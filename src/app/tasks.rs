@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 use super::camera_pictures::CameraPicture;
 use super::inspect::Truth;
 use super::kept_picture::KeptPicture;
+use super::looks::ReadLook;
 use super::small_maps::SmallMapsFound;
 use super::threads::{Wake, spawn};
 use super::worker::Reference;
@@ -22,6 +23,8 @@ pub(super) enum TaskResult {
     Failed(String),
     /// What errors are to be measured against.
     Reference(Arc<Reference>),
+    /// A look that was read.
+    Look(ReadLook),
     /// What is true at the inspected point.
     Truth(Truth),
     /// Pictures that earlier windows kept.

@@ -449,6 +449,41 @@ fn a_light_mix_changes_the_picture_that_there_is() {
     assert!(snapshot(&studio).groups.is_empty());
 }
 
+/// Restored settings and undo name looks, too, which are read when they are needed.
+#[test]
+fn a_look_is_read_when_it_is_named_and_taken_back_if_it_cannot_be() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let white = "1 1 1\n".repeat(8);
+    std::fs::write(path("white.cube"), format!("LUT_3D_SIZE 2\n{white}")).expect("written");
+    std::fs::write(path("worse.CUBE"), "LUT_3D_SIZE 2\n1 1 1\n").expect("written");
+    studio.settle().expect("rendered");
+    let levels = |studio: &mut Studio| {
+        studio.settle().expect("rendered");
+        studio.frame().expect("drawn");
+        studio.app.display.read().expect("a picture").expect("read").pixels
+    };
+    let before = levels(&mut studio);
+    studio.asks(Command::OpenLook(path("white.cube")));
+    assert!(levels(&mut studio).iter().all(|rgb| *rgb == [255; 3]));
+    let names = &studio.app.assets.looks.listed;
+    assert!(names.len() == 2 && names[1].ends_with("worse.CUBE"), "{names:?}");
+    studio.asks(Command::Undo);
+    assert!(levels(&mut studio) == before);
+    studio.asks(Command::Redo);
+    assert!(levels(&mut studio).iter().all(|rgb| *rgb == [255; 3]));
+    studio.asks(Command::OpenLook(path("worse.CUBE")));
+    assert!(levels(&mut studio) == before, "there is none");
+    assert_eq!(studio.app.edited.document.look.lut, None);
+    let said = studio.app.messages.first_error();
+    assert!(said.is_some_and(|said| said.contains("1 colours in place of 8")), "{said:?}");
+    studio.app.edited.document.look.lut = Some("look:night".to_owned());
+    let night = levels(&mut studio);
+    let sum = |all: &[[u8; 3]]| all.as_flattened().iter().map(|x| u64::from(*x)).sum::<u64>();
+    assert!(sum(&night) < sum(&before));
+}
+
 #[test]
 fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
     let Some(mut studio) = studio("open") else { return };
@@ -474,6 +509,7 @@ fn what_is_only_looked_at_stays_as_it_is() {
     let scattering = glam::Vec3::new(1.234e-7, 20.0, 0.123_456_7);
     document.fog = Some(Medium { scattering, anisotropy: 0.987_65, ..Medium::default() });
     document.look.exposure_ev = 9.126;
+    (document.look.lut, document.look.lut_strength) = (Some("look:soft".to_owned()), 0.123_4);
     document.look.white_balance = WhiteBalance { kelvin: 5_003.7, tint: 0.123_4 };
     document.light.bounces = 70;
     document.stop = StopRule { samples: Some(2_000_000), noise: Some(1e-6), seconds: Some(0.05) };

@@ -9,7 +9,7 @@ use crate::image::{Image, check_writable, is_same_file, name_of_process};
 use crate::output::{self, Exposure, Films, LayerName, LinearRgb, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
-use crate::tone::{KELVIN, TINT, ToneCurve, WhiteBalance};
+use crate::tone::{Grade, KELVIN, Lut, TINT, Tone, ToneCurve, WhiteBalance};
 
 /// How pictures are written.
 #[derive(Debug, Clone, clap::Args)]
@@ -20,6 +20,13 @@ pub(super) struct PictureArguments {
     /// Tone curve of .png pictures.
     #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
+    /// Look over .png pictures: a .cube file over sRGB colours, or look:punchy, soft, warm, cool, night,
+    /// black-and-white.
+    #[arg(long, value_parser = parse_look, value_name = "FILE|look:NAME", help_heading = "Picture")]
+    look: Option<Lut>,
+    /// Share of the look, from 0 to 1.
+    #[arg(long, default_value_t = 1.0, requires = "look", value_parser = parse_strength, value_name = "SHARE", help_heading = "Picture")]
+    look_strength: f32,
     /// What takes noise out of .png pictures and videos; unless it is given, the best there is.
     #[arg(long, value_name = "FILTER", num_args = 0..=1, default_missing_value = "best", help_heading = "Picture")]
     denoise: Option<Denoise>,
@@ -56,6 +63,15 @@ pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String
     }
     let stops = values::finite(text).map_err(|e| format!("{e} of stops, or auto"))?;
     Ok(Exposure::Stops(stops as f32))
+}
+
+fn parse_look(text: &str) -> std::result::Result<Lut, String> {
+    Lut::read(text).map_err(|error| error.to_string())
+}
+
+fn parse_strength(text: &str) -> std::result::Result<f32, String> {
+    let strength = values::not_negative(text)?;
+    if strength <= 1.0 { Ok(strength) } else { Err("expected a share from 0 to 1".to_owned()) }
 }
 
 fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
@@ -126,10 +142,11 @@ impl PictureArguments {
             notice("Open Image Denoise takes out the noise (--denoise off keeps it)");
         }
         let is_developed = (self.exposure, self.tonemap) != (Exposure::Auto, ToneCurve::default())
-            || self.white.is_some();
+            || self.white.is_some()
+            || self.look.is_some();
         if is_developed && pictures.iter().all(|path| output::holds_layers(path)) {
             notice(
-                "--exposure, --tonemap and --white change nothing: .exr pictures hold what was rendered",
+                "--exposure, --tonemap, --look and --white change nothing: .exr pictures hold what was rendered",
             );
         }
     }
@@ -170,9 +187,11 @@ impl PictureArguments {
 
     /// Without layers a film is denoised only if that was asked for, which then fails with a sentence.
     fn options(&self, film: &Film) -> PictureOptions {
+        let strength = self.look_strength;
+        let grade = self.look.clone().map(|lut| Grade { lut, strength });
         PictureOptions {
             exposure: self.exposure,
-            tone_curve: self.tonemap,
+            tone: Tone { curve: self.tonemap, grade },
             denoiser: self.denoiser().filter(|_| film.has_layers() || self.asks_for_denoiser()),
             rgb: self.rgb,
             white_balance: self.white.unwrap_or_default(),

@@ -2,7 +2,7 @@
 //!
 //! A [`LinearPicture`] is the film of a GPU session as it is, or sums that were uploaded. A
 //! [`Developer`] takes noise out of it, measures it for the exposure, and develops it: white balance,
-//! exposure, tone curve, sRGB, dither and overlay, as [`crate::tone`] does on the CPU, within one
+//! exposure, tone curve, sRGB, look, dither and overlay, as [`crate::tone`] does on the CPU, within one
 //! 8-bit level.
 
 mod a_trous;
@@ -12,13 +12,15 @@ mod picture;
 pub(crate) mod tests;
 mod upload;
 
+use std::sync::{Mutex, PoisonError};
+
 use bytemuck::{Pod, Zeroable};
 use glam::Mat3;
 
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
 use crate::render::gpu::{Gpu, buffer};
-use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
+use crate::tone::{Lut, Tone, WhiteBalance, auto_exposure_ev};
 use passes::{dispatch, entry, pipelines, stored};
 pub(crate) use picture::{DisplayTexture, LinearPicture, OverlayTexture};
 
@@ -26,14 +28,14 @@ pub(crate) use picture::{DisplayTexture, LinearPicture, OverlayTexture};
 const EXPOSURE_WIDTH: u32 = 64;
 
 /// How a picture is developed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DevelopSettings {
     /// The light that looks white.
     pub(crate) white_balance: WhiteBalance,
     /// Stops.
     pub(crate) exposure_ev: f32,
-    /// Tone curve.
-    pub(crate) curve: ToneCurve,
+    /// Tone curve and look.
+    pub(crate) tone: Tone,
     /// How much of the picture an overlay covers, `[0,1]`: where it has a colour, and how far the
     /// picture steps back where it has none.
     pub(crate) opacity: [f32; 2],
@@ -52,23 +54,28 @@ struct DeviceSettings {
     is_balanced: u32,
     has_overlay: u32,
     unscale: f32,
-    padding: u32,
+    look_side: u32,
+    look_strength: f32,
+    padding: [u32; 3],
 }
 
 impl DeviceSettings {
     fn new(picture: &LinearPicture, settings: &DevelopSettings) -> Self {
         let matrix = settings.white_balance.matrix();
+        let grade = settings.tone.grade.as_ref();
         Self {
             matrix: matrix.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]),
             size: picture.size(),
             small_size: [0; 2],
             gain: settings.exposure_ev.exp2(),
-            curve: settings.curve as u32,
+            curve: settings.tone.curve as u32,
             opacity: settings.opacity,
             is_balanced: (matrix != Mat3::IDENTITY).into(),
             has_overlay: 0,
             unscale: picture.film.scale.recip(),
-            padding: 0,
+            look_side: grade.map_or(0, |grade| grade.lut.side()),
+            look_strength: grade.map_or(0.0, |grade| grade.strength),
+            padding: [0; 3],
         }
     }
 }
@@ -81,6 +88,8 @@ pub(crate) struct Developer {
     shrink: wgpu::ComputePipeline,
     a_trous: a_trous::Passes,
     no_overlay: OverlayTexture,
+    /// The look that was used last, on the device; one entry if there was none.
+    look: Mutex<(Option<Lut>, wgpu::Buffer)>,
 }
 
 impl Developer {
@@ -93,7 +102,8 @@ impl Developer {
         let [develop, shrink] = pipelines(gpu, "develop", source, ["develop", "shrink"]);
         let no_overlay = OverlayTexture::new(gpu, [1, 1], &[[0; 4]]);
         let a_trous = a_trous::Passes::new(gpu);
-        let developer = Self { gpu: gpu.clone(), develop, shrink, a_trous, no_overlay };
+        let look = Mutex::new((None, stored(gpu, &[[0.0; 4]])));
+        let developer = Self { gpu: gpu.clone(), develop, shrink, a_trous, no_overlay, look };
         gpu.check()?;
         Ok(developer)
     }
@@ -130,7 +140,7 @@ impl Developer {
         let settings = DevelopSettings {
             white_balance,
             exposure_ev: 0.0,
-            curve: ToneCurve::None,
+            tone: Tone::default(),
             opacity: [0.0; 2],
         };
         let settings = DeviceSettings {
@@ -159,6 +169,7 @@ impl Developer {
         settings: &DevelopSettings,
         display: &DisplayTexture,
     ) {
+        let look = self.look_of(settings.tone.grade.as_ref().map(|grade| &grade.lut));
         let has_overlay = overlay.is_some().into();
         let settings = DeviceSettings { has_overlay, ..DeviceSettings::new(picture, settings) };
         let settings = stored(&self.gpu, &[settings]);
@@ -166,7 +177,8 @@ impl Developer {
         let textures = [(4, overlay), (5, &display.view)].map(|(binding, view)| {
             wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) }
         });
-        let entries = [self.inputs(picture, &settings).as_slice(), &textures].concat();
+        let inputs = self.inputs(picture, &settings);
+        let entries = [inputs.as_slice(), &textures, &[entry(7, &look)]].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.develop, &entries, picture.size());
         self.gpu.submit([commands.finish()]);
@@ -178,6 +190,15 @@ impl Developer {
     /// If the device fails.
     pub(crate) fn read(&self, display: &DisplayTexture) -> Result<Rgb8> {
         self.gpu.read_texture(display.view.texture())
+    }
+
+    /// A look's colours on the device.
+    fn look_of(&self, lut: Option<&Lut>) -> wgpu::Buffer {
+        let mut look = self.look.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(lut) = lut.filter(|lut| look.0.as_ref() != Some(lut)) {
+            *look = (Some(lut.clone()), stored(&self.gpu, lut.entries()));
+        }
+        look.1.clone()
     }
 
     /// What both entry points read.

@@ -4,7 +4,7 @@ use super::*;
 use crate::denoise;
 use crate::path::{FirstHit, PathResult};
 use crate::render::film::Film;
-use crate::tone::{DAYLIGHT_KELVIN, display_rgb8};
+use crate::tone::{DAYLIGHT_KELVIN, Grade, ToneCurve, display_rgb8};
 
 /// Of a device; `None`, which is said, where there is none.
 pub(crate) fn developer() -> Option<Developer> {
@@ -12,9 +12,10 @@ pub(crate) fn developer() -> Option<Developer> {
     developer.inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
 }
 
-fn settings(curve: ToneCurve, exposure_ev: f32) -> DevelopSettings {
+fn settings(tone: impl Into<Tone>, exposure_ev: f32) -> DevelopSettings {
+    let tone = tone.into();
     let white_balance = WhiteBalance::default();
-    DevelopSettings { white_balance, exposure_ev, curve, opacity: [0.0; 2] }
+    DevelopSettings { white_balance, exposure_ev, tone, opacity: [0.0; 2] }
 }
 
 fn developed(
@@ -81,14 +82,20 @@ fn pictures_are_those_of_the_cpu_within_one_level() {
     let image = extremes();
     let picture = LinearPicture::of_image(&developer.gpu, &image);
     let balances = [(DAYLIGHT_KELVIN, 0.0), (2000.0, 0.0), (12000.0, -1.0), (3200.0, 1.0)];
+    let graded = [("look:punchy", 1.0), ("look:black-and-white", 0.5)].map(|(name, strength)| {
+        let lut = Lut::read(name).expect("a look");
+        Tone { grade: Some(Grade { lut, strength }), ..Tone::default() }
+    });
+    let tones: Vec<Tone> = ToneCurve::ALL.into_iter().map(Tone::from).chain(graded).collect();
     for (kelvin, tint) in balances {
         let white_balance = WhiteBalance { kelvin, tint };
         let balanced = white_balance.apply(image.clone());
-        for curve in ToneCurve::ALL {
+        for tone in &tones {
             for exposure_ev in [-120.0, -8.0, 0.0, 0.3, 8.0, 100.0, 300.0] {
-                let settings = DevelopSettings { white_balance, ..settings(curve, exposure_ev) };
+                let settings =
+                    DevelopSettings { white_balance, ..settings(tone.clone(), exposure_ev) };
                 let found = developed(&developer, &picture, None, &settings);
-                let expected = display_rgb8(&balanced, exposure_ev, curve);
+                let expected = display_rgb8(&balanced, exposure_ev, tone.clone());
                 let (most, share) = difference(&found, &expected);
                 let worst = found
                     .pixels
@@ -96,8 +103,8 @@ fn pictures_are_those_of_the_cpu_within_one_level() {
                     .zip(&expected.pixels)
                     .position(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 1));
                 let worst = worst.map(|i| (image.pixels[i], found.pixels[i], expected.pixels[i]));
-                assert!(most <= 1, "{curve:?} {exposure_ev} EV {kelvin} K: {worst:?}");
-                assert!(share < 0.005, "{curve:?} {exposure_ev} EV {kelvin} K: {share} differ");
+                assert!(most <= 1, "{tone:?} {exposure_ev} EV {kelvin} K: {worst:?}");
+                assert!(share < 0.005, "{tone:?} {exposure_ev} EV {kelvin} K: {share} differ");
             }
         }
     }
@@ -138,7 +145,7 @@ fn films_give_their_means_and_the_exposure_of_the_cpu() {
     let picture = LinearPicture::of_film(&developer.gpu, &film, false);
     let settings = settings(ToneCurve::Agx, 0.5);
     let found = developed(&developer, &picture, None, &settings);
-    let expected = display_rgb8(&film.image(), settings.exposure_ev, settings.curve);
+    let expected = display_rgb8(&film.image(), settings.exposure_ev, settings.tone.clone());
     assert!(difference(&found, &expected).0 <= 1);
     for kelvin in [DAYLIGHT_KELVIN, 3000.0] {
         let white_balance = WhiteBalance { kelvin, tint: 0.2 };
@@ -186,7 +193,7 @@ fn overlays_are_blended_and_the_rest_steps_back() {
     let under = developed(&developer, &picture, None, &plain);
     for opacity in [0.0, 0.35, 0.7, 1.0] {
         let opacity = [opacity, 0.6 * opacity];
-        let settings = DevelopSettings { opacity, ..plain };
+        let settings = DevelopSettings { opacity, ..plain.clone() };
         let found = developed(&developer, &picture, Some(&overlay), &settings);
         for ((found, under), color) in found.pixels.iter().zip(&under.pixels).zip(&colors) {
             let share = opacity[usize::from(color.is_none())];

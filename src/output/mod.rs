@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Image, Layer, extension, write_exr, write_png};
 use crate::render::film::{Film, Pixel};
 pub use crate::render::light_groups::GroupImage;
-use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
+use crate::tone::{Grade, Tone, WhiteBalance, auto_exposure_ev, display_rgb8};
 
 /// A layer that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,8 +91,8 @@ with_defaults! {
     pub struct PictureOptions {
         /// Exposure of `.png` pictures.
         pub exposure: Exposure = Exposure::Auto,
-        /// Tone curve of `.png` pictures.
-        pub tone_curve: ToneCurve = ToneCurve::default(),
+        /// Tone curve and look of `.png` pictures.
+        pub tone: Tone = Tone::default(),
         /// What takes the noise out of `.png` pictures, of [`LayerName::Denoised`] and of [`LinearRgb::Denoised`].
         pub denoiser: Option<Denoiser> = None,
         /// RGB of `.exr` pictures.
@@ -197,11 +197,19 @@ pub fn write_picture(
         metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
     }
     metadata.extend(filter_metadata(options, films));
-    metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.to_string()));
+    metadata.push(("lightgrid.tonemap".to_owned(), options.tone.curve.to_string()));
+    if let Some(Grade { lut, strength }) = &options.tone.grade {
+        metadata.push(("lightgrid.look".to_owned(), format!("{},{strength}", lut.name())));
+    }
     let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
-        return write_png(path, &display_rgb8(&image, stops, options.tone_curve), None, &metadata);
+        return write_png(
+            path,
+            &display_rgb8(&image, stops, options.tone.clone()),
+            None,
+            &metadata,
+        );
     };
-    let covered = display_rgb8(&divided(image, &alpha), stops, options.tone_curve);
+    let covered = display_rgb8(&divided(image, &alpha), stops, options.tone.clone());
     let alpha: Vec<u8> = alpha.iter().map(|share| (255.0 * share).round() as u8).collect();
     write_png(path, &covered, Some(&alpha), &metadata)
 }

@@ -453,6 +453,31 @@ fn a_moment_is_enough_for_a_whole_picture() {
 }
 
 #[test]
+fn a_look_is_laid_over_pictures_for_a_display_alone() {
+    let bench = Bench::new();
+    let swapped = "# red and blue change places\nLUT_3D_SIZE 2\n0 0 0\n0 0 1\n0 1 0\n0 1 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1\n";
+    fs::write(bench.path("swap.cube"), swapped).expect("written");
+    let rendered = |look: &str| {
+        bench.render(&format!("-o a.png -o a.exr --reproducible {look}"));
+        (read_rgb(&bench.path("a.png")), read_picture(&bench.path("a.exr")).expect("read").pixels)
+    };
+    let (plain, linear) = rendered("");
+    let colors = |rgb: &[u8]| rgb.chunks(3).filter(|c| c[0] != c[2]).count();
+    assert!(colors(&plain) > 100, "the map is blue");
+    let (swapped, same) = rendered("--look swap.cube");
+    assert!(same == linear, "linear radiance has no look");
+    let differs = |(a, b): (&[u8], &[u8])| [0, 1, 2].iter().any(|c| a[2 - c].abs_diff(b[*c]) > 1);
+    assert_eq!(plain.chunks(3).zip(swapped.chunks(3)).filter(|pair| differs(*pair)).count(), 0);
+    let (grey, _) = rendered("--look look:black-and-white");
+    assert_eq!(colors(&grey), 0);
+    let (half, _) = rendered("--look look:black-and-white --look-strength 0");
+    assert!(half == plain);
+    let png = fs::read(bench.path("a.png")).expect("written");
+    let words = b"look:black-and-white,0";
+    assert!(png.windows(words.len()).any(|bytes| bytes == words));
+}
+
+#[test]
 fn odd_but_sound_settings_render() {
     let bench = Bench::new();
     for rest in [
@@ -504,6 +529,11 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--layers foo", "albedo, normal, depth"),
         ("--table foo", "tile-local"),
         ("--tonemap filmic", "reinhard"),
+        ("--look look:sepia", "there is no such look (look:punchy"),
+        ("--look none.cube", "none.cube: there is no such file"),
+        ("--look scene.gltf", "scene.gltf: line 1 is none of a .cube file"),
+        ("--look look:warm --look-strength 1.5", "a share from 0 to 1"),
+        ("--look-strength 0.5", "--look <"),
         ("--fog -1", "must not be negative"),
         ("--fog 1,2", "one number or three"),
         ("--fog-anisotropy 2", "between -1 and 1"),

@@ -7,8 +7,7 @@ use glam::Vec3;
 use super::overlay::Overlay;
 use super::painted::{Legend, Painted, Range, scaled};
 use super::palette;
-use crate::app::document::Look;
-use crate::color::srgb8_from_linear;
+use crate::develop::DevelopSettings;
 use crate::radiance_cache::{CacheFacts, KnownCell};
 use crate::render::surface_map::{Spot, SurfaceMap};
 
@@ -17,7 +16,7 @@ pub(super) fn paint(
     overlay: Overlay,
     cache: &CacheFacts,
     surfaces: &SurfaceMap,
-    look: Option<(Look, f32)>,
+    settings: Option<&DevelopSettings>,
 ) -> Painted {
     let of = |spot: &Option<Spot>| spot.map(|s| cache.cell_at(s.position, s.normal));
     let cells: Vec<Option<KnownCell>> = surfaces.spots.iter().map(of).collect();
@@ -30,17 +29,19 @@ pub(super) fn paint(
         }
         _ => {
             let developed = |cell: KnownCell| {
-                look.filter(|_| cell.samples_around > 0).map(|look| develop(cell.radiance, look))
+                let settings = settings.filter(|_| cell.samples_around > 0);
+                settings.map(|settings| develop(cell.radiance, settings))
             };
             Painted::new(cells.into_iter().map(|c| c.and_then(developed)).collect(), Legend::None)
         }
     }
 }
 
-/// As the picture is developed: white balance, exposure, tone curve.
-fn develop(radiance: Vec3, (look, automatic_ev): (Look, f32)) -> [u8; 3] {
-    let balanced = (look.white_balance.matrix() * radiance).max(Vec3::ZERO);
-    srgb8_from_linear(look.curve.apply(balanced * look.total_ev(automatic_ev).exp2()))
+/// As the picture is developed: white balance, exposure, tone curve, look.
+fn develop(radiance: Vec3, settings: &DevelopSettings) -> [u8; 3] {
+    let balanced = (settings.white_balance.matrix() * radiance).max(Vec3::ZERO);
+    let color = settings.tone.apply(balanced * settings.exposure_ev.exp2());
+    color.to_array().map(|x| (255.0 * x).round() as u8)
 }
 
 fn levels(cells: &[Option<KnownCell>]) -> Painted {
@@ -74,10 +75,9 @@ pub fn length(metres: f32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::document::Document;
     use crate::color::srgb_from_linear;
     use crate::radiance_cache::{CacheCells, RadianceSums};
-    use crate::tone::{ToneCurve, WhiteBalance};
+    use crate::tone::{Grade, Lut, Tone, ToneCurve, WhiteBalance};
 
     /// Two trained cells, of different levels, one that leans on the first, the back of it, and no surface.
     fn known() -> (CacheFacts, SurfaceMap) {
@@ -127,20 +127,19 @@ mod tests {
     #[test]
     fn radiance_is_developed_as_the_picture_is() {
         let (facts, surfaces) = known();
-        let look = Look {
-            exposure_ev: 1.0,
-            curve: ToneCurve::None,
-            white_balance: WhiteBalance::default(),
-            ..Document::default().look
+        let painted = |settings: &DevelopSettings| {
+            paint(Overlay::CacheRadiance, &facts, &surfaces, Some(settings)).colors
         };
-        let painted = |look| paint(Overlay::CacheRadiance, &facts, &surfaces, Some(look)).colors;
-        // A stop over 0.18, and another that is found out.
-        for (look, expected) in [
-            ((Look { auto_exposure: false, ..look }, 1.0), 0.36),
-            ((Look { auto_exposure: true, ..look }, 1.0), 0.72),
-        ] {
+        let grade =
+            |strength| Grade { lut: Lut::read("look:black-and-white").expect("a look"), strength };
+        let white_balance = WhiteBalance::default();
+        for (exposure_ev, grade, expected) in
+            [(1.0, None, 0.36), (2.0, None, 0.72), (1.0, Some(grade(0.0)), 0.36)]
+        {
+            let tone = Tone { curve: ToneCurve::None, grade };
             let expected = (255.0 * srgb_from_linear(expected)).round() as u8;
-            let colors = painted(look);
+            let colors =
+                painted(&DevelopSettings { white_balance, exposure_ev, tone, opacity: [0.0; 2] });
             for color in &colors[..3] {
                 let color = color.expect("something speaks for it");
                 assert!(color.iter().all(|level| level.abs_diff(expected) <= 1), "{color:?}");

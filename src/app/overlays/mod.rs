@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::develop::DevelopSettings;
 use crate::environment::sun::Sun;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
@@ -9,7 +10,6 @@ use crate::render::film::{Film, Pixel};
 use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
 
-use super::document::Look;
 use super::worker::{Request, Snapshot};
 
 mod cache;
@@ -34,8 +34,8 @@ pub(super) struct Sources<'a> {
     pub(super) surfaces: Option<&'a SurfaceMap>,
     /// Facts of the cells of its grid.
     pub(super) facts: Option<&'a CellFacts>,
-    /// How light is developed, and the stops that are found out.
-    pub(super) look: Option<(Look, f32)>,
+    /// How light is developed.
+    pub(super) settings: Option<DevelopSettings>,
     /// The tile chosen on the map.
     pub(super) tile: Option<u32>,
     /// The map's sun, unless the map is black.
@@ -56,7 +56,7 @@ impl Sources<'_> {
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
             _ if overlay.is_of_cache() => {
                 let facts = self.snapshot.cache.as_ref().ok()?;
-                Some(cache::paint(overlay, facts, self.surfaces?, self.look))
+                Some(cache::paint(overlay, facts, self.surfaces?, self.settings.as_ref()))
             }
             _ => self.cells(overlay),
         }

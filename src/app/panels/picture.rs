@@ -5,18 +5,20 @@ use egui::{DragValue, Ui};
 use super::button::button;
 use super::scope::Scope;
 use crate::app::commands::Command;
-use crate::app::document::{Document, PictureSize};
+use crate::app::document::{Document, Look, PictureSize};
+use crate::app::interface::Purpose;
 use crate::app::theme;
 use crate::denoise::Denoiser;
-use crate::tone::{DAYLIGHT_KELVIN, KELVIN, TINT, ToneCurve, WhiteBalance};
+use crate::tone::{DAYLIGHT_KELVIN, KELVIN, Lut, TINT, ToneCurve, WhiteBalance};
 
 /// Draws the settings.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
-    let Scope { document, display, rendering, commands, .. } = scope;
+    let Scope { document, display, rendering, assets, commands, .. } = scope;
     let exposure_ev = display.exposure_ev(document);
     theme::heading(ui, "DEVELOP");
     exposure(ui, document, exposure_ev);
     curve(ui, document);
+    look(ui, &mut document.look, &assets.looks.listed, commands);
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
     theme::section(ui, "LIGHT");
@@ -98,6 +100,30 @@ fn curve_name(curve: ToneCurve) -> &'static str {
         ToneCurve::Neutral => "Khronos Neutral",
         ToneCurve::Reinhard => "Reinhard",
         ToneCurve::None => "None",
+    }
+}
+
+/// Chooses a look; `listed` are those beside the one that was opened last.
+fn look(ui: &mut Ui, look: &mut Look, listed: &[String], commands: &mut Vec<Command>) {
+    let title = |name: &str| match name.strip_prefix("look:") {
+        Some(name) => name.replace('-', " "),
+        None => theme::file_name(name),
+    };
+    theme::row(ui, "Look", "Colours laid over the picture", |ui| {
+        let shown = look.lut.as_deref().map_or("None".to_owned(), title);
+        theme::choice(ui, "look").selected_text(shown).show_ui(ui, |ui| {
+            ui.selectable_value(&mut look.lut, None, "None");
+            for name in Lut::built_in().chain(listed.iter().cloned()) {
+                let title = title(&name);
+                ui.selectable_value(&mut look.lut, Some(name), title);
+            }
+            let hint = "A look as graders write it, for pictures in sRGB";
+            button(ui, ("Open a .cube file…", hint), commands, Command::Ask(Purpose::Look));
+        });
+    });
+    if look.lut.is_some() {
+        let slider = theme::slider(&mut look.lut_strength, 0.0..=1.0).fixed_decimals(2);
+        theme::set(ui, "Strength", "Share of the look", slider);
     }
 }
 

@@ -10,6 +10,7 @@ use crate::app::interface::{Interface, Purpose, Refusal};
 use crate::app::theme;
 use crate::image::extension;
 use crate::sources;
+use crate::tone::Lut;
 
 /// Why a path is not taken, unless it is; `typed` is the path as it was typed.
 fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
@@ -22,6 +23,7 @@ fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
     let is_built_in = match purpose {
         Purpose::Scene => sources::is_built_in_scene(typed),
         Purpose::Map => sources::is_built_in_map(typed),
+        Purpose::Look => Lut::is_built_in(typed),
         _ => false,
     };
     match path {
@@ -59,6 +61,7 @@ pub(in crate::app) fn show(
     let (hint, accept) = match prompt.purpose {
         Purpose::Scene => ("Path of a .gltf or .glb file", "Open"),
         Purpose::Map => ("Path of an .exr, .hdr or 8-bit picture", "Open"),
+        Purpose::Look => ("Path of a .cube file", "Open"),
         Purpose::Picture => ("Path of a .png (as shown) or .exr (linear, all layers)", "Save"),
         Purpose::Render => ("Path of a .png (developed) or .exr (linear, all layers)", "Render"),
         Purpose::RenderFrames => {

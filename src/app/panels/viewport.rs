@@ -30,7 +30,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let scale = ui.ctx().pixels_per_point();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
-        let settings = scope.display.settings(scope.document, scope.interface.overlay_opacity);
+        let tone = scope.assets.looks.tone(&scope.document.look);
+        let opacity = scope.interface.overlay_opacity;
+        let settings = scope.display.settings(scope.document, tone, opacity);
         let shown = scope.display.shown.clone();
         let Some((shown, settings)) = shown.as_deref().zip(settings) else {
             ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
@@ -42,7 +44,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let ground = if compared.is_some() { rect } else { whole };
         let is_part = shown.order.snapshot.request.view.crop.is_some();
         surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
-        picture(ui, (ground, rect), shown, settings, scope);
+        picture(ui, (ground, rect), shown, settings.clone(), scope);
         labels(ui, rect, shown);
         let seen = rect.intersect(area);
         let mut handle = Rect::NOTHING;

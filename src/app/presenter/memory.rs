@@ -8,10 +8,9 @@ use super::order::{Order, Shown};
 use super::recent::Recent;
 use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
-use crate::app::document::Look;
 use crate::app::overlays::{CellFacts, Overlay, Painted, Sources};
 use crate::app::worker::{Request, Snapshot};
-use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::develop::{DevelopSettings, Developer, LinearPicture, OverlayTexture};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
@@ -78,7 +77,7 @@ pub(super) struct Memory {
 }
 
 /// Snapshot, overlay, tile, and how light is developed: what an overlay is painted from.
-type OverlayKey = (u64, Overlay, Option<u32>, Option<(Look, f32)>);
+type OverlayKey = (u64, Overlay, Option<u32>, Option<DevelopSettings>);
 
 /// What is on one device.
 #[derive(Default)]
@@ -185,9 +184,14 @@ impl Memory {
         let overlay = order.overlay.filter(|_| !order.covers_now());
         let painted = overlay.map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
-            let look = order.look.map(|look| (look, automatic_ev));
-            let key = (order.snapshot.number, overlay, order.tile, look);
-            let paint = || Ok(self.paint(order, overlay, look, &completed.picture));
+            let settings = order.look.as_ref().map(|(look, tone)| DevelopSettings {
+                white_balance: look.white_balance,
+                exposure_ev: look.total_ev(automatic_ev),
+                tone: tone.clone(),
+                opacity: [0.0; 2],
+            });
+            let key = (order.snapshot.number, overlay, order.tile, settings.clone());
+            let paint = || Ok(self.paint(order, overlay, settings, &completed.picture));
             let painted = last.or_make(key, paint);
             self.uploads.overlay = last;
             painted
@@ -277,7 +281,7 @@ impl Memory {
         &mut self,
         order: &Order,
         overlay: Overlay,
-        look: Option<(Look, f32)>,
+        settings: Option<DevelopSettings>,
         picture: &LinearPicture,
     ) -> Option<Painted<OverlayTexture>> {
         if overlay.needs_surfaces() {
@@ -287,7 +291,7 @@ impl Memory {
             snapshot: &order.snapshot,
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
-            look,
+            settings,
             tile: order.tile,
             sun: order.sun.as_ref(),
         };

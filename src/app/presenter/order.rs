@@ -11,7 +11,7 @@ use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::environment::sun::Sun;
 use crate::image::Image;
-use crate::tone::WhiteBalance;
+use crate::tone::{Tone, WhiteBalance};
 
 /// What is to be shown.
 #[derive(Clone)]
@@ -29,7 +29,7 @@ pub(crate) struct Order {
     /// What is drawn over it.
     pub overlay: Option<Overlay>,
     /// How the overlay is developed, if it shows light.
-    pub look: Option<Look>,
+    pub look: Option<(Look, Tone)>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
     /// The sun of the map, if the overlay asks for it.
@@ -41,11 +41,12 @@ pub(crate) struct Order {
 impl PartialEq for Order {
     fn eq(&self, other: &Self) -> bool {
         let ahead = |of: &Self| of.ahead.as_ref().map(Arc::as_ptr);
-        let settings = |of: &Self| (of.denoiser, of.metered, of.overlay, of.look, of.tile, of.sun);
+        let settings = |of: &Self| (of.denoiser, of.metered, of.overlay, of.tile, of.sun);
         Arc::ptr_eq(&self.developer, &other.developer)
             && self.snapshot.number == other.snapshot.number
             && ahead(self) == ahead(other)
             && settings(self) == settings(other)
+            && self.look == other.look
             && self.compared == other.compared
     }
 }

@@ -495,6 +495,8 @@ mod tests {
                 },
                 look: Look {
                     curve: ToneCurve::Neutral,
+                    lut: Some("look:warm".to_owned()),
+                    lut_strength: 0.5,
                     white_balance: WhiteBalance { kelvin: 4000.0, tint: -0.25 },
                     denoiser: Denoiser::ATrous,
                     ..Look::default()
@@ -546,7 +548,13 @@ mod tests {
             assert_eq!(asked.stop_rule(), document.stop);
             assert_eq!(asked.device, DeviceChoice::Cpu);
             let picture = format!("{:?}", asked.picture);
-            for part in ["Stops(-1.5)", "Neutral", "ATrous", "kelvin: 4000.0, tint: -0.25"] {
+            for part in [
+                "Stops(-1.5)",
+                "Neutral",
+                "Lut(look:warm)), look_strength: 0.5",
+                "ATrous",
+                "kelvin: 4000.0, tint: -0.25",
+            ] {
                 assert!(picture.contains(part), "{part}: {picture}");
             }
             let SceneOptions { hide, .. } = asked.of_scene.options();
