@@ -256,8 +256,8 @@ fn of_tab(ui: &mut egui::Ui, scope: &mut Scope<'_>) {
         Tab::Picture => {
             panels::picture::show(ui, scope);
             panels::final_render::show(ui, scope);
-            panels::history::show(ui, scope);
         }
+        Tab::Compare => panels::history::show(ui, scope),
         Tab::Inspect => {
             panels::method::show(ui, scope);
             panels::overlay::show(ui, scope);

@@ -135,9 +135,13 @@ impl Assets {
         Some(Arc::clone(transformed))
     }
 
-    /// Measures errors against a picture from now on, or against none.
-    pub(super) fn set_reference(&mut self, reference: Option<Arc<Reference>>) {
-        (self.reference, self.reference_of) = (reference, None);
+    /// Measures errors against a picture from now on, or against none. Without a document it shows that of now.
+    pub(super) fn set_reference(
+        &mut self,
+        reference: Option<Arc<Reference>>,
+        of: Option<Box<Document>>,
+    ) {
+        (self.reference, self.reference_of) = (reference, of.map(|of| *of));
     }
 
     /// Keeps the reference with materials that were given other numbers.

@@ -105,6 +105,8 @@ pub enum Command {
     OpenReference(String),
     /// Measure no errors any more.
     ForgetReference,
+    /// Render a picture that errors are measured against.
+    RenderReference,
     /// Close the window.
     Quit,
 }

@@ -10,7 +10,7 @@ use super::application::App;
 use super::assets::room_viewpoint;
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
-use super::final_render::{Motion, command_line};
+use super::final_render::{FinalRender, Motion, command_line};
 use super::interface::{Chosen, Purpose, Tab, Tool};
 use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
@@ -27,6 +27,7 @@ use crate::image::{Image, read_picture};
 use crate::render::gpu::DeviceChoice;
 use crate::render::sun_placement::SunPlacement;
 use crate::render::surface_map::look_at_place;
+use crate::render::{Sampling, StopRule};
 use crate::scene::{LampEdits, builtin};
 use crate::sources;
 use crate::tone::{Lut, display_rgb8};
@@ -69,17 +70,18 @@ impl App {
             Command::OpenReference(name) => {
                 self.tasks.run("reference", move || {
                     let image = read_picture(Path::new(&name))?;
-                    Ok(TaskResult::Reference(Arc::new(Reference { name, image })))
+                    Ok(TaskResult::Reference(Arc::new(Reference { name, image }), None))
                 });
             }
-            Command::ForgetReference => self.assets.set_reference(None),
+            Command::RenderReference => self.render_reference(),
+            Command::ForgetReference => self.assets.set_reference(None, None),
             Command::ShowMethod => self.messages.failure(desktop::show_method()),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
-            Command::Render(path) => match self.render_words(&path) {
+            Command::Render(path) => match self.shown_words(&path) {
                 Some(words) => {
                     self.library.note_save(&path);
-                    self.renders.add(path, words);
+                    self.renders.add(path, words, None);
                     self.is_warned = false;
                 }
                 None => self.messages.notice(NOT_YET),
@@ -87,7 +89,7 @@ impl App {
             Command::EndRender(index) => self.renders.end(index),
             Command::CopyCommandLine => {
                 let path = self.suggested_render();
-                let words = self.render_words(Path::new(&path));
+                let words = self.shown_words(Path::new(&path));
                 let copied = words.map(|words| context.copy_text(command_line(&words)));
                 self.messages.notice(copied.map_or(NOT_YET, |()| "Copied the command"));
             }
@@ -323,7 +325,7 @@ impl App {
         let (index, failure) = self.library.history.keep(summary, &image, document.clone(), small);
         self.messages.failure(failure);
         self.interface.compared = Chosen { left: Some(index), ..Chosen::default() };
-        self.interface.tab = Tab::Picture;
+        self.interface.tab = Tab::Compare;
     }
 
     /// The picture on the screen, if it is of the document and whole.
@@ -396,15 +398,48 @@ impl App {
         }
     }
 
+    /// Renders what is shown, with other random numbers, into a picture that errors are measured against.
+    fn render_reference(&mut self) {
+        let mut document = self.edited.document.clone();
+        let of = Box::new(document.clone());
+        document.stop = StopRule { samples: Some(4096), noise: Some(0.005), seconds: None };
+        (document.look.denoise, document.light_mix) = (false, false);
+        document.light.seed = document.light.seed.wrapping_add(1);
+        document.light.sampling = Sampling::Adaptive;
+        let name = format!("lightgrid-{}-reference.exr", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let size = self.rendering.snapshot.as_ref().map(|snapshot| {
+            let view = &snapshot.request.view;
+            view.crop.map_or([view.width, view.height], |crop| crop.whole)
+        });
+        let words = size.and_then(|size| {
+            let render = FinalRender { size, ..FinalRender::default() };
+            self.render_words(&render, &document, &path)
+        });
+        match words {
+            Some(words) => self.renders.add(path, words, Some(of)),
+            None => self.messages.notice(NOT_YET),
+        }
+    }
+
     /// Arguments of this program that render what is shown into a file.
-    fn render_words(&self, path: &Path) -> Option<Vec<String>> {
-        let document = &self.edited.document;
+    fn shown_words(&self, path: &Path) -> Option<Vec<String>> {
+        self.render_words(&self.interface.final_render, &self.edited.document, path)
+    }
+
+    /// Arguments of this program that render a document of the scene that is shown.
+    fn render_words(
+        &self,
+        render: &FinalRender,
+        document: &Document,
+        path: &Path,
+    ) -> Option<Vec<String>> {
         let scene = &self.assets.scene_of(document)?.world.scene;
         let of_scene = &self.library.history.of_scene;
         let look = &document.look;
         let own_ev = (!look.auto_exposure).then_some(look.exposure_ev);
         let exposure_ev = self.display.exposure_ev(document).or(own_ev);
-        Some(self.interface.final_render.words(document, scene, of_scene, exposure_ev, path))
+        Some(render.words(document, scene, of_scene, exposure_ev, path))
     }
 
     fn export(&mut self, path: PathBuf) {

@@ -128,6 +128,8 @@ pub enum Tab {
     Scene,
     /// Settings of the picture.
     Picture,
+    /// Kept pictures.
+    Compare,
     /// Overlays and inspector.
     Inspect,
 }

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
+use super::document::Document;
 use super::theme::file_name;
 use super::threads::{Wake, lock, spawn};
 use crate::error::{At as _, Error, Result};
@@ -35,6 +36,8 @@ pub(super) struct Job {
     thread: Option<JoinHandle<()>>,
     /// Whether it is to end before it is done.
     is_cut_short: bool,
+    /// What it shows, if errors are to be measured against it and its file is for that alone.
+    pub(super) reference_of: Option<Box<Document>>,
 }
 
 /// How far a job is.
@@ -108,11 +111,16 @@ impl RenderQueue {
         Self { program, jobs: Vec::new(), wake }
     }
 
-    /// Adds a file that the program with these arguments writes.
-    pub(super) fn add(&mut self, path: PathBuf, words: Vec<String>) {
+    /// Adds a file that the program with these arguments writes, and of what it is a reference, if it is one.
+    pub(super) fn add(
+        &mut self,
+        path: PathBuf,
+        words: Vec<String>,
+        reference_of: Option<Box<Document>>,
+    ) {
         let state = Arc::default();
         let (input, thread, is_cut_short) = (None, None, false);
-        self.jobs.push(Job { path, words, state, input, thread, is_cut_short });
+        self.jobs.push(Job { path, words, state, input, thread, is_cut_short, reference_of });
     }
 
     /// Starts the next job where none runs; what there is to say of one that has ended.
@@ -122,6 +130,7 @@ impl RenderQueue {
             job.thread = None;
             let name = file_name(&job.path.display().to_string());
             return Some(match ended {
+                Ok(()) if job.reference_of.is_some() => return None,
                 Ok(()) if job.is_cut_short => Ok(format!("{name} was ended early and written")),
                 Ok(()) => Ok(format!("{name} is rendered")),
                 Err(why) => Err(format!("{name} is not rendered: {why}")),
@@ -133,9 +142,19 @@ impl RenderQueue {
         Some(Err(failure))
     }
 
-    /// Files that are not yet there.
+    /// A reference that is there, and what it shows; it leaves the list.
+    pub(super) fn take_reference(&mut self) -> Option<(PathBuf, Box<Document>)> {
+        let is_there =
+            |job: &Job| job.reference_of.is_some() && job.state() == State::Ended(Ok(()));
+        let index = self.jobs.iter().position(is_there)?;
+        let job = self.jobs.remove(index);
+        Some((job.path, job.reference_of?))
+    }
+
+    /// Files that are not yet there and that a person waits for.
     pub(super) fn unfinished(&self) -> usize {
-        let is_unfinished = |job: &&Job| !matches!(job.state(), State::Ended(_));
+        let is_unfinished =
+            |job: &&Job| job.reference_of.is_none() && !matches!(job.state(), State::Ended(_));
         self.jobs.iter().filter(is_unfinished).count()
     }
 
@@ -159,6 +178,11 @@ impl RenderQueue {
             let was_running = job.thread.take().map(JoinHandle::join).is_some();
             let path = job.path.display();
             failures.extend(match job.state() {
+                _ if job.reference_of.is_some() => {
+                    // It may not have been written.
+                    let _ = std::fs::remove_file(&job.path);
+                    None
+                }
                 State::Waiting => Some(format!("{path}: not rendered: the window was closed")),
                 State::Ended(Err(why)) if was_running => {
                     Some(format!("{path}: not rendered: {why}"))

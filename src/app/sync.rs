@@ -13,9 +13,10 @@ use super::library::Library;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::messages::Messages;
 use super::tasks::TaskResult;
-use super::worker::{Request, Snapshot};
+use super::worker::{Reference, Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::error::Error;
+use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 use crate::render::light_groups::MAX_LAMPS;
 use crate::sources;
@@ -63,6 +64,15 @@ impl App {
             Some(Ok(sentence)) => self.messages.notice(sentence),
             Some(Err(sentence)) => self.messages.error(sentence),
             None => {}
+        }
+        if let Some((path, of)) = self.renders.take_reference() {
+            self.tasks.run("reference", move || {
+                let image = read_picture(&path);
+                // What is left of it lies among other files that nobody needs.
+                let _ = std::fs::remove_file(&path);
+                let name = "a render of its own".to_owned();
+                Ok(TaskResult::Reference(Arc::new(Reference { name, image: image? }), Some(of)))
+            });
         }
         self.take_render_failures();
         self.rendering.collect();
@@ -200,13 +210,13 @@ impl App {
                     });
                 }
             }
-            TaskResult::Reference(reference) => {
+            TaskResult::Reference(reference, of) => {
                 let (name, image) = (&reference.name, &reference.image);
                 self.messages.notice(format!(
                     "Errors are measured against {name} in pictures of {} x {} pixels",
                     image.width, image.height
                 ));
-                self.assets.set_reference(Some(reference));
+                self.assets.set_reference(Some(reference), of);
             }
         }
     }

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use super::camera_pictures::CameraPicture;
+use super::document::Document;
 use super::inspect::Truth;
 use super::kept_picture::KeptPicture;
 use super::looks::ReadLook;
@@ -21,8 +22,8 @@ pub(super) enum TaskResult {
     Done(String),
     /// Something failed.
     Failed(String),
-    /// What errors are to be measured against.
-    Reference(Arc<Reference>),
+    /// What errors are to be measured against, and what it shows if that is known.
+    Reference(Arc<Reference>, Option<Box<Document>>),
     /// A look that was read.
     Look(ReadLook),
     /// What is true at the inspected point.

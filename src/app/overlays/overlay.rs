@@ -49,7 +49,7 @@ overlays! {
     /// Entropy of the cell's distribution.
     Entropy = "Entropy of the distribution": "0 bits: always the same tile. High: no preference."
     /// Distance of the cell's distribution from the whole map's.
-    Distance = "Distance from the whole map's distribution":
+    Distance = "Distance from the whole map":
         "Total variation between the cell's distribution and the whole map's: 0 equal, 1 disjoint."
     /// Each cell's probability of the tile chosen on the map.
     Tile = "Probability of the chosen tile":

@@ -11,13 +11,14 @@ use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
 use crate::app::interface::Purpose;
 use crate::app::overlays::palette;
+use crate::app::render_queue::{Job, State};
 use crate::app::theme;
 use crate::app::worker::Point;
 
 /// Draws the plot of all runs.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let hides_clock = scope.is_repeatable;
-    let Scope { document, assets, rendering, commands, .. } = scope;
+    let Scope { document, assets, rendering, renders, commands, .. } = scope;
     let convergence = &mut rendering.convergence;
     let by_samples = hides_clock || convergence.by_samples;
     ui.horizontal_wrapped(|ui| {
@@ -28,6 +29,16 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         theme::note(ui, "Earlier runs are dim");
         let hint = "A picture of this view without noise; the true error is plotted, too";
         button(ui, ("Reference…", hint), commands, Command::Ask(Purpose::Reference));
+        match renders.jobs.iter().find(|job| job.reference_of.is_some()).map(Job::state) {
+            Some(State::Running { share, .. }) => {
+                theme::note(ui, format!("Reference: {:.0} %", 100.0 * share));
+            }
+            Some(State::Waiting) => theme::note(ui, "Reference: other files come first"),
+            _ => {
+                let hint = "Renders this view until hardly any noise is left, beside the window";
+                button(ui, ("Render one", hint), commands, Command::RenderReference);
+            }
+        }
         if let Some((reference, is_of_view)) = assets.reference(document) {
             if ui.button("Remove").on_hover_text(&reference.name).clicked() {
                 commands.push(Command::ForgetReference);

@@ -21,7 +21,7 @@ const MAX_NAME: usize = 80;
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let Scope { interface, library, commands, .. } = scope;
     let (chosen, history) = (&mut interface.compared, &mut library.history);
-    theme::section(ui, "COMPARE");
+    theme::heading(ui, "KEPT PICTURES");
     let hint = "Keeps it for comparison with other pictures and later renders (K)";
     button(ui, ("Keep this picture", hint), commands, Command::KeepPicture);
     if chosen.left.is_some() {

@@ -28,6 +28,7 @@ pub(in crate::app) fn show(
                 ui.selectable_value(tab, Tab::Scene, "Scene");
             }
             ui.selectable_value(tab, Tab::Picture, "Picture");
+            ui.selectable_value(tab, Tab::Compare, "Compare");
             ui.selectable_value(tab, Tab::Inspect, "Inspect");
         });
         ui.separator();
