@@ -99,6 +99,8 @@ pub enum Command {
     RenameKept(usize, String),
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
+    /// Keep the inspected cell to compare others with it, or no longer.
+    ToggleKeptCell,
     /// Write all distributions.
     Export(PathBuf),
     /// Measure errors against this picture.

@@ -74,6 +74,7 @@ impl App {
                 });
             }
             Command::RenderReference => self.render_reference(),
+            Command::ToggleKeptCell => self.rendering.inspector.toggle_kept(),
             Command::ForgetReference => self.assets.set_reference(None, None),
             Command::ShowMethod => self.messages.failure(desktop::show_method()),
             Command::Save(path) => self.save(path),

@@ -1,5 +1,6 @@
 //! What the grid knows at one point, and what is true there.
 
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -70,6 +71,8 @@ pub(super) struct Inspector {
     source: Option<(Vec2, u64)>,
     /// Whether a truth is being measured.
     pub(super) busy: bool,
+    /// A cell that others are compared with.
+    pub(super) kept: Option<Inspected>,
 }
 
 impl Inspector {
@@ -90,6 +93,22 @@ impl Inspector {
     /// Forgets everything: another scene or map is shown, and what is known of the last one is large.
     pub(super) fn forget(&mut self) {
         *self = Self { busy: self.busy, ..Self::default() };
+    }
+
+    /// Densities in 1/sr of a place within a tile, in `[0,1]^2`: of sampling the map from the inspected cell, and of a
+    /// diffuse bounce there.
+    pub(super) fn densities(&self, tile: u32, within: Vec2) -> Option<[f32; 2]> {
+        let (inspected, environment) = (self.inspected.as_ref()?, self.environment.as_ref()?);
+        let direction = environment.direction_in_tile(tile, within);
+        let (_, tile, pdf) = environment.radiance_and_tile_pdf(direction);
+        let probability = inspected.probabilities.get(tile as usize)?;
+        let cosine = direction.dot(inspected.spot.normal).max(0.0);
+        Some([probability * pdf, cosine / PI])
+    }
+
+    /// Keeps the inspected cell, so that others are compared with it, or no longer.
+    pub(super) fn toggle_kept(&mut self) {
+        self.kept = self.inspected.clone().filter(|_| self.kept.is_none());
     }
 
     /// Takes a truth that is ready.

@@ -36,7 +36,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         TileView::Energy => &energies,
     };
     let most = largest(shown);
-    tiles(ui, interface, map, (shown, most), map.sun.as_ref());
+    tiles(ui, interface, map, (shown, most), map.sun.as_ref(), None);
     if !shown.is_empty() {
         color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
     }
@@ -61,13 +61,29 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     theme::section(ui, "CELL UNDER THE POINTER");
     match &inspector.inspected {
         Some(inspected) => {
-            measure(ui, interface, inspector.busy, commands);
+            measure(ui, interface, inspector, commands);
             if let Some(truth) = inspector.truth() {
-                pixel_light::show(ui, truth, inspected.cell.map(|_| misplaced(truth, inspected)));
+                pixel_light::show(
+                    ui,
+                    truth,
+                    inspected.cell.map(|_| misplaced(&truth.shares, inspected)),
+                );
             }
-            facts(ui, inspected);
+            facts(ui, "cell", inspected);
             cached(ui, inspected, snapshot);
             cell(ui, interface, inspector, inspected, map);
+            if let Some(kept) = &inspector.kept {
+                theme::section(ui, "KEPT CELL");
+                facts(ui, "kept cell", kept);
+                let most = largest(&kept.probabilities);
+                tiles(ui, interface, map, (&kept.probabilities, most), None, None);
+                color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
+                let elsewhere = theme::percent(misplaced(&kept.probabilities, inspected));
+                theme::note(
+                    ui,
+                    format!("{elsewhere} of the probability above lies elsewhere here"),
+                );
+            }
         }
         None if interface.pinned.is_some() => {
             theme::note(ui, "There is no surface here, only the map; click elsewhere.");
@@ -120,6 +136,7 @@ fn tiles(
     map: &LoadedMap,
     (shares, most): (&[f32], f32),
     sun: Option<&Sun>,
+    of: Option<&Inspector>,
 ) {
     let (rect, response) = map_view::ground(ui, map);
     let (size, painter) = (map.environment.tile_grid(), ui.painter_at(rect));
@@ -151,7 +168,18 @@ fn tiles(
         mark(tile, Color32::WHITE);
         let share = theme::percent(shares.get(tile as usize).copied().unwrap_or(0.0));
         let (row, column) = (tile / size.0, tile % size.0);
-        response.on_hover_text(format!("Tile {tile}: row {row}, column {column}\n{share}"));
+        let rect = map_view::tile_rect(rect, size, tile);
+        let within = response.hover_pos().map(|at| (at - rect.min) / rect.size());
+        let densities = within.and_then(|Vec2 { x, y }| of?.densities(tile, glam::Vec2::new(x, y)));
+        let densities = densities.map_or(String::new(), |[light, bounce]| {
+            let weight = theme::percent(light / (light + bounce).max(f32::MIN_POSITIVE));
+            format!(
+                "\npdf {} / sr, MIS weight {weight} beside a diffuse bounce",
+                theme::figure(f64::from(light))
+            )
+        });
+        let place = format!("Tile {tile}: row {row}, column {column}");
+        response.on_hover_text(format!("{place}\n{share}{densities}"));
     }
 }
 
@@ -175,8 +203,14 @@ fn chosen_tile(ui: &mut Ui, interface: &mut Interface, map: &LoadedMap, tile: u3
 }
 
 /// Asks for what is true under the pointer.
-fn measure(ui: &mut Ui, interface: &mut Interface, is_busy: bool, commands: &mut Vec<Command>) {
-    ui.horizontal(|ui| {
+fn measure(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    inspector: &Inspector,
+    commands: &mut Vec<Command>,
+) {
+    let is_busy = inspector.busy;
+    ui.horizontal_wrapped(|ui| {
         let label = if is_busy { "Measuring…" } else { "Measure the truth" };
         let button = ui.add_enabled(!is_busy, egui::Button::new(label));
         let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
@@ -187,12 +221,17 @@ fn measure(ui: &mut Ui, interface: &mut Interface, is_busy: bool, commands: &mut
         if interface.pinned.is_some() && ui.button("Unpin").clicked() {
             interface.pinned = None;
         }
+        let (name, hint) = match inspector.kept {
+            None => ("Keep the cell", "Shows it below whatever cell is under the pointer"),
+            Some(_) => ("Drop the kept cell", "Shows one cell alone"),
+        };
+        button(ui, (name, hint), commands, Command::ToggleKeptCell);
     });
 }
 
-/// Share of the learned probability that lies where the truth has none.
-fn misplaced(truth: &Truth, inspected: &Inspected) -> f32 {
-    truth.shares.iter().zip(&inspected.probabilities).map(|(a, b)| 0.5 * (a - b).abs()).sum()
+/// Share of the learned probability that lies where another distribution has none.
+fn misplaced(shares: &[f32], inspected: &Inspected) -> f32 {
+    shares.iter().zip(&inspected.probabilities).map(|(a, b)| 0.5 * (a - b).abs()).sum()
 }
 
 fn cell(
@@ -207,18 +246,18 @@ fn cell(
     let most = truth.map_or(0.0, |truth| largest(&truth.shares));
     let most = most.max(largest(&inspected.probabilities));
     if !inspected.probabilities.is_empty() {
-        tiles(ui, interface, map, (&inspected.probabilities, most), None);
+        tiles(ui, interface, map, (&inspected.probabilities, most), None, Some(inspector));
         color_bar::show(ui, (MIN_SHARE, most), true, theme::percent);
         theme::note(ui, "Probability of each tile, learned");
     }
     if let Some(truth) = truth {
-        tiles(ui, interface, map, (&truth.shares, most), None);
+        tiles(ui, interface, map, (&truth.shares, most), None, None);
         ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
             "Ground truth: no part of the map is visible from this point".to_owned()
         } else {
             format!(
                 "Ground truth (visible energy times cosine): {:.0} % of the learned probability lies elsewhere",
-                100.0 * misplaced(truth, inspected)
+                100.0 * misplaced(&truth.shares, inspected)
             )
         }));
     }
@@ -249,7 +288,7 @@ fn picture(ui: &mut Ui, snapshot: &Snapshot) {
     });
 }
 
-fn facts(ui: &mut Ui, inspected: &Inspected) {
+fn facts(ui: &mut Ui, id: &str, inspected: &Inspected) {
     let p = inspected.in_file;
     let cell = match inspected.cell {
         Some((cell, [face, row, column])) => {
@@ -263,7 +302,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         distribution => distribution.to_string(),
     };
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
-    in_rows(ui, "cell", |line| {
+    in_rows(ui, id, |line| {
         let hint = "Cells of the Light Grid surround the camera: rows by elevation, columns by azimuth, one for each axis that a surface may face";
         line("Cell", cell, hint);
         let hint =
