@@ -21,6 +21,8 @@ pub(super) struct ReadLook {
 pub(super) struct Looks {
     /// `None` while one is read.
     read: BTreeMap<String, Option<Lut>>,
+    /// What was asked for last that is there.
+    pub(super) last: Option<String>,
     /// Files in the folder of the one that was read last.
     pub(super) listed: Vec<String>,
 }
@@ -28,7 +30,14 @@ pub(super) struct Looks {
 impl Looks {
     /// Reads the look that is asked for, unless that was done.
     pub(super) fn read(&mut self, look: &Look) -> Option<impl FnOnce() -> ReadLook + use<>> {
-        let name = look.lut.clone().filter(|name| !self.read.contains_key(name))?;
+        let name = match &look.lut {
+            Some(name) if !self.read.contains_key(name) => name.clone(),
+            Some(name) if self.read[name].is_none() => return None,
+            asked => {
+                self.last.clone_from(asked);
+                return None;
+            }
+        };
         self.read.insert(name.clone(), None);
         Some(move || {
             let is_file = !Lut::is_built_in(&name);
@@ -55,9 +64,11 @@ impl Looks {
         self.read.remove(name);
     }
 
-    /// Tone curve and look as they are asked for; without a look while it is read.
+    /// Tone curve and look as they are asked for; with the look before while one is read.
     pub(super) fn tone(&self, look: &Look) -> Tone {
-        let lut = look.lut.as_ref().and_then(|name| self.read.get(name)?.clone());
+        let read = |name: &String| self.read.get(name)?.clone();
+        let asked = look.lut.as_ref();
+        let lut = asked.and_then(|name| read(name).or_else(|| read(self.last.as_ref()?)));
         let grade = lut.map(|lut| Grade { lut, strength: look.lut_strength });
         Tone { curve: look.curve, grade }
     }

@@ -205,8 +205,11 @@ impl App {
                 let name = look.name.clone();
                 if let Err(error) = self.assets.looks.take(look) {
                     self.messages.error(error.to_string());
+                    let last = self.assets.looks.last.clone();
                     self.edited.put_back(|document| {
-                        document.look.lut.take_if(|lut| *lut == name);
+                        if document.look.lut == Some(name) {
+                            document.look.lut = last;
+                        }
                     });
                 }
             }
