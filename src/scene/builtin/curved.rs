@@ -17,21 +17,20 @@ impl Builder {
         surface: impl Fn(f32, f32) -> Vec3,
     ) {
         const STEP: f32 = 2e-3;
-        let first = self.scene.positions.len() as u32;
-        for j in 0..=nv {
-            for i in 0..=nu {
-                let (u, v) = (i as f32 / nu as f32, j as f32 / nv as f32);
-                let du = surface(u + STEP, v) - surface(u - STEP, v);
-                let dv = surface(u, v + STEP) - surface(u, v - STEP);
-                let normal = du.cross(dv).normalize_or_zero();
-                self.vertex((surface(u, v), normal, Vec2::new(u, v) * uv_size));
-            }
-        }
-        self.join(mat, first, [nu, nv]);
+        self.grid(mat, [nu, nv], |i, j| {
+            let (u, v) = (i as f32 / nu as f32, j as f32 / nv as f32);
+            let du = surface(u + STEP, v) - surface(u - STEP, v);
+            let dv = surface(u, v + STEP) - surface(u, v - STEP);
+            (surface(u, v), du.cross(dv).normalize_or_zero(), Vec2::new(u, v) * uv_size)
+        });
     }
 
-    /// Joins the vertices from `first` on, which stand row by row, to a grid of `nu` x `nv` quads.
-    fn join(&mut self, mat: Mat, first: u32, [nu, nv]: [u32; 2]) {
+    /// A grid of `nu` x `nv` quads with a corner for each column and row. Returns its first vertex.
+    fn grid(&mut self, mat: Mat, [nu, nv]: [u32; 2], corner: impl Fn(u32, u32) -> Corner) -> u32 {
+        let first = self.scene.positions.len() as u32;
+        for (j, i) in (0..=nv).flat_map(|j| (0..=nu).map(move |i| (j, i))) {
+            self.vertex(corner(i, j));
+        }
         for j in 0..nv {
             for i in 0..nu {
                 let a = first + j * (nu + 1) + i;
@@ -40,6 +39,7 @@ impl Builder {
                 self.triangle(mat, [a, c, d]);
             }
         }
+        first
     }
 
     /// Surface of revolution about +Y of a `profile` of (radius, height), whose front is on the
@@ -65,25 +65,21 @@ impl Builder {
             let start = if i > 0 { smooth(here, normal(i - 1)) } else { here };
             let end = if i + 2 < points.len() { smooth(here, normal(i + 1)) } else { here };
             let next = length + points[i].distance(points[i + 1]);
-            let first = self.scene.positions.len() as u32;
-            for k in 0..=segments {
+            let ends = [(points[i], start, length), (points[i + 1], end, next)];
+            self.grid(mat, [1, segments], |column, k| {
                 let turn = k as f32 / segments as f32;
                 let (sin, cos) = (turn * TAU).sin_cos();
                 let turned = |v: Vec2| Vec3::new(v.x * cos, v.y, v.x * sin);
-                for (p, n, along) in [(points[i], start, length), (points[i + 1], end, next)] {
-                    self.vertex((turned(p), turned(n), Vec2::new(turn * girth, along)));
-                }
-            }
-            self.join(mat, first, [1, segments]);
+                let (p, n, along) = ends[column as usize];
+                (turned(p), turned(n), Vec2::new(turn * girth, along))
+            });
             length = next;
         }
     }
 
     /// An upright cylinder or cone frustum with rounded-off rims, centred on the part's +Y axis.
-    pub(super) fn drum(&mut self, mat: Mat, y: [f32; 2], radius: [f32; 2], bevel: f32) {
-        let segments = if radius[0].max(radius[1]) > 0.06 { 48 } else { 20 };
-        let [y0, y1] = y;
-        let [r0, r1] = radius;
+    pub(super) fn drum(&mut self, mat: Mat, [y0, y1]: [f32; 2], [r0, r1]: [f32; 2], bevel: f32) {
+        let segments = if r0.max(r1) > 0.06 { 48 } else { 20 };
         let profile = [
             (0.0, y0),
             (r0 - bevel, y0),
@@ -110,25 +106,24 @@ impl Builder {
                 (path[i.saturating_sub(1)].0, path[(i + 1).min(path.len() - 1)].0);
             (after - before).normalize_or(Vec3::Y)
         };
-        let first = self.scene.positions.len() as u32;
         let mut side = tangent(0).any_orthonormal_vector();
         let mut length = 0.0;
-        for (i, &(centre, radius)) in path.iter().enumerate() {
+        let ring = |(i, &(centre, _)): (usize, &(Vec3, f32))| {
             let forward = tangent(i);
             side =
                 (side - forward * side.dot(forward)).normalize_or(forward.any_orthonormal_vector());
-            let other = forward.cross(side);
             length += if i > 0 { centre.distance(path[i - 1].0) } else { 0.0 };
-            for k in 0..=segments {
-                let turn = k as f32 / segments as f32;
-                let (sin, cos) = (turn * TAU).sin_cos();
-                let normal = side * cos + other * sin;
-                let uv = Vec2::new(length, turn * TAU * radius);
-                self.vertex((centre + normal * radius, normal, uv));
-            }
-        }
+            (side, forward.cross(side), length)
+        };
+        let rings: Vec<_> = path.iter().enumerate().map(ring).collect();
         let pieces = path.len() as u32 - 1;
-        self.join(mat, first, [segments, pieces]);
+        let first = self.grid(mat, [segments, pieces], |k, i| {
+            let ((centre, radius), (side, other, length)) = (path[i as usize], rings[i as usize]);
+            let turn = k as f32 / segments as f32;
+            let (sin, cos) = (turn * TAU).sin_cos();
+            let normal = side * cos + other * sin;
+            (centre + normal * radius, normal, Vec2::new(length, turn * TAU * radius))
+        });
         let last = first + pieces * (segments + 1);
         for (start, outward) in [(first, -tangent(0)), (last, tangent(path.len() - 1))] {
             let local = self.world_from_part.inverse();
@@ -154,27 +149,20 @@ impl Builder {
         for face in 0..6 {
             let (axis, sign) = (face % 3, if face < 3 { 1.0 } else { -1.0 });
             let (b, c) = (axes[(axis + 1) % 3] * sign, axes[(axis + 2) % 3]);
-            let first = self.scene.positions.len() as u32;
-            for row in 0..=n {
-                for column in 0..=n {
-                    let [s, t] = [column, row]
-                        .map(|i| (FRAC_PI_4 * (2.0 * i as f32 / n as f32 - 1.0)).tan());
-                    let cube = axes[axis] * sign + b * s + c * t;
-                    let flat =
-                        (cube.x.abs().powf(k) + cube.z.abs().powf(k)).powf(1.0 / k).max(1e-4);
-                    let p = cube / (flat.powf(j) + cube.y.abs().powf(j)).powf(1.0 / j);
-                    let flat = flat * p.length() / cube.length();
-                    let slope = |x: f32, power: f32| x.abs().powf(power - 1.0).copysign(x);
-                    let wide = flat.powf(j - k);
-                    let gradient =
-                        Vec3::new(wide * slope(p.x, k), slope(p.y, j), wide * slope(p.z, k));
-                    let place = p * half;
-                    let uv = Vec2::new(place.dot(b.abs()), place.dot(c));
-                    let normal = (gradient / half).normalize_or(axes[axis] * sign);
-                    self.vertex((centre + place, normal, uv));
-                }
-            }
-            self.join(mat, first, [n, n]);
+            self.grid(mat, [n, n], |column, row| {
+                let [s, t] =
+                    [column, row].map(|i| (FRAC_PI_4 * (2.0 * i as f32 / n as f32 - 1.0)).tan());
+                let cube = axes[axis] * sign + b * s + c * t;
+                let flat = (cube.x.abs().powf(k) + cube.z.abs().powf(k)).powf(1.0 / k).max(1e-4);
+                let p = cube / (flat.powf(j) + cube.y.abs().powf(j)).powf(1.0 / j);
+                let flat = flat * p.length() / cube.length();
+                let slope = |x: f32, power: f32| x.abs().powf(power - 1.0).copysign(x);
+                let wide = flat.powf(j - k);
+                let gradient = Vec3::new(wide * slope(p.x, k), slope(p.y, j), wide * slope(p.z, k));
+                let place = p * half;
+                let uv = Vec2::new(place.dot(b.abs()), place.dot(c));
+                (centre + place, (gradient / half).normalize_or(axes[axis] * sign), uv)
+            });
         }
     }
 
