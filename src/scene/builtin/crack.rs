@@ -74,15 +74,11 @@ fn crate_box(b: &mut Builder, wood: Mat, iron: Mat, [w, h, d]: [f32; 3]) {
         let (y0, y1) =
             (h * k as f32 / boards as f32 + 0.003, h * (k + 1) as f32 / boards as f32 - 0.003);
         for side in [-1.0, 1.0] {
-            let (near, far) = (side * z, side * (z - t - 0.002));
-            b.slab(wood, [-x, y0, near.min(far)], [x, y1, near.max(far)], 0.003);
+            b.slab(wood, [-x, y0, side * z], [x, y1, side * (z - t - 0.002)], 0.003);
             let (near, far) = (side * (x - 0.001), side * (x - t - 0.003));
-            b.slab(
-                wood,
-                [near.min(far), y0 + 0.0006, -z + t - 0.004],
-                [near.max(far), y1 - 0.0006, z - t + 0.004],
-                0.003,
-            );
+            let (low, high) =
+                ([near, y0 + 0.0006, -z + t - 0.004], [far, y1 - 0.0006, z - t + 0.004]);
+            b.slab(wood, low, high, 0.003);
         }
     }
     let lids = (d / 0.12) as u32;

@@ -57,8 +57,7 @@ pub(super) fn bookcase(
 ) {
     let (x, z, t) = (0.5 * width, 0.5 * depth, 0.022);
     for side in [-1.0, 1.0] {
-        let inner = side * (x - t);
-        b.slab(wood, [inner.min(side * x), 0.0, -z], [inner.max(side * x), height, z], 0.002);
+        b.slab(wood, [side * (x - t), 0.0, -z], [side * x, height, z], 0.002);
     }
     b.slab(wood, [-x + 0.01, 0.05, -z + 0.003], [x - 0.01, height - 0.01, -z + 0.012], 0.0);
     b.slab(

@@ -154,9 +154,10 @@ impl Builder {
         self.polygon(mat, &corners, a.cross(b));
     }
 
-    /// A box with rounded-off edges `bevel` wide; texture u runs along its faces' longer sides.
+    /// A box between two opposite corners with rounded-off edges `bevel` wide; texture u runs along its faces' longer
+    /// sides.
     pub(super) fn slab(&mut self, mat: Mat, lo: [f32; 3], hi: [f32; 3], bevel: f32) {
-        let (lo, hi) = (Vec3::from(lo), Vec3::from(hi));
+        let [lo, hi] = [Vec3::min, Vec3::max].map(|end| end(lo.into(), hi.into()));
         let bevel = bevel.min(0.49 * (hi - lo).min_element());
         let offset = Vec2::new(lo.x * 1.7 + lo.z * 0.6, lo.y + lo.z * 2.3);
         // A corner of the box as a vertex of its face across `axis`.
