@@ -45,12 +45,8 @@ pub(super) fn house(
     windows: (u32, bool),
 ) {
     let inset = fronts.map(|front| if front { FRONT - 0.02 } else { 0.0 });
-    b.slab(
-        m.pane,
-        [x0 + inset[0], -0.02, z0 + inset[2]],
-        [x1 - inset[1], height - 0.05, z1 - inset[3]],
-        0.0,
-    );
+    let [left, right, far, near] = inset;
+    b.slab(m.pane, [x0 + left, -0.02, z0 + far], [x1 - right, height - 0.05, z1 - near], 0.0);
     let sides = [
         (Vec3::new(x0, 0., z0), Vec3::Z, z1 - z0),
         (Vec3::new(x1, 0., z1), Vec3::NEG_Z, z1 - z0),

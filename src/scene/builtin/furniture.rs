@@ -60,12 +60,8 @@ pub(super) fn bookcase(
         b.slab(wood, [side * (x - t), 0.0, -z], [side * x, height, z], 0.002);
     }
     b.slab(wood, [-x + 0.01, 0.05, -z + 0.003], [x - 0.01, height - 0.01, -z + 0.012], 0.0);
-    b.slab(
-        wood,
-        [-x + 0.006, height - t - 0.001, -z + 0.001],
-        [x - 0.006, height - 0.001, z + 0.006],
-        0.002,
-    );
+    let top = height - 0.001;
+    b.slab(wood, [-x + 0.006, height - t - 0.001, -z + 0.001], [x - 0.006, top, z + 0.006], 0.002);
     b.slab(wood, [-x + 0.01, 0.001, z - 0.045], [x - 0.01, 0.07, z - 0.03], 0.0);
     let step = (height - t - 0.08) / rows as f32;
     let mut stream = Stream::new(rows * 31 + (width * 100.0) as u32);
@@ -95,12 +91,8 @@ pub(super) fn drawers(b: &mut Builder, body: Mat, metal: Mat, size: [f32; 3], gr
     for i in 0..columns {
         for j in 0..rows {
             let (u, v) = (-x + 0.006 + w * i as f32, 0.07 + h * j as f32);
-            b.slab(
-                body,
-                [u + 0.002, v + 0.002, z - 0.03],
-                [u + w - 0.002, v + h - 0.002, z],
-                0.003,
-            );
+            let (low, high) = ([u + 0.002, v + 0.002, z - 0.03], [u + w - 0.002, v + h - 0.002, z]);
+            b.slab(body, low, high, 0.003);
             let (cu, cv) = (u + 0.5 * w, v + h - 0.25 * h.min(0.2));
             let (l, r) = (Vec3::new(cu - 0.06, cv, z + 0.025), Vec3::new(cu + 0.06, cv, z + 0.025));
             let into = Vec3::Z * 0.03;

@@ -136,12 +136,8 @@ fn arcade(b: &mut Builder, m: &Palette) {
         b.slab(stone, [end, spring - 0.004, -0.4], [end + 0.44, top, 0.0], 0.0);
         b.slab(stone, [-0.08, top - 0.03, -0.5], [end + 0.52, top + 0.12, 0.10], 0.03);
     });
-    b.slab(
-        m.stone_house.base,
-        [x + 0.05, top - 0.10, z0 - 0.2],
-        [7.1, top + 0.05, z0 + 6.0 * bay + 0.2],
-        0.01,
-    );
+    let end = z0 + 6.0 * bay + 0.2;
+    b.slab(m.stone_house.base, [x + 0.05, top - 0.10, z0 - 0.2], [7.1, top + 0.05, end], 0.01);
 }
 
 fn cafe(b: &mut Builder, m: &Palette) {
