@@ -26,8 +26,8 @@ pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4
         return Vec4::ONE;
     }
     let uv = texture_ref.transform.transform_point2(uv);
-    let x = Axis { size: image.width, wrap: texture.wrap_u }.footprint(uv.x);
-    let y = Axis { size: image.height, wrap: texture.wrap_v }.footprint(uv.y);
+    let x = texture.wrap_u.footprint(uv.x, image.width);
+    let y = texture.wrap_v.footprint(uv.y, image.height);
     let unit = &*UNIT_FROM_BYTE;
     let color = if texture.srgb { &*LINEAR_FROM_SRGB_BYTE } else { unit };
     let (color, unit) = (|byte| color[usize::from(byte)], |byte| unit[usize::from(byte)]);
@@ -79,13 +79,6 @@ impl Filter {
     }
 }
 
-/// One axis of an image.
-#[derive(Clone, Copy)]
-struct Axis {
-    size: u32,
-    wrap: Wrap,
-}
-
 /// The texels along one axis that a coordinate reads.
 struct Footprint {
     low: u32,
@@ -95,17 +88,14 @@ struct Footprint {
     nearest: u32,
 }
 
-impl Axis {
-    fn footprint(self, t: f32) -> Footprint {
-        let last = self.size - 1;
-        let position = self.into_unit(t) * self.size as f32;
+impl Wrap {
+    /// Along an axis of `size` texels.
+    fn footprint(self, t: f32, size: u32) -> Footprint {
+        let position = self.into_unit(t) * size as f32;
         let floor = floor(position - 0.5);
-        Footprint {
-            low: self.neighbour(floor as i32),
-            high: self.neighbour(floor as i32 + 1),
-            fraction: position - 0.5 - floor,
-            nearest: (position as u32).min(last),
-        }
+        let [low, high] = [0, 1].map(|next| self.neighbour(floor as i32 + next, size - 1));
+        let nearest = (position as u32).min(size - 1);
+        Footprint { low, high, fraction: position - 0.5 - floor, nearest }
     }
 
     /// Into `[0,1]` by the wrap mode.
@@ -113,23 +103,22 @@ impl Axis {
         if !t.is_finite() {
             return 0.0;
         }
-        match self.wrap {
-            Wrap::Repeat => t - floor(t),
-            Wrap::MirroredRepeat => {
+        match self {
+            Self::Repeat => t - floor(t),
+            Self::MirroredRepeat => {
                 let half = 0.5 * t;
                 1.0 - (2.0 * (half - floor(half)) - 1.0).abs()
             }
-            Wrap::ClampToEdge => t.clamp(0.0, 1.0),
+            Self::ClampToEdge => t.clamp(0.0, 1.0),
         }
     }
 
-    /// The texel that an index from -1 to the size stands for: tiled, or the edge (which is its own
+    /// The texel that an index from -1 to one after the last texel stands for: tiled, or the edge (which is its own
     /// mirror image).
-    fn neighbour(self, index: i32) -> u32 {
-        let last = self.size - 1;
-        let [before, after] = match self.wrap {
-            Wrap::Repeat => [last, 0],
-            Wrap::MirroredRepeat | Wrap::ClampToEdge => [0, last],
+    fn neighbour(self, index: i32, last: u32) -> u32 {
+        let [before, after] = match self {
+            Self::Repeat => [last, 0],
+            Self::MirroredRepeat | Self::ClampToEdge => [0, last],
         };
         match u32::try_from(index) {
             Err(_) => before,
