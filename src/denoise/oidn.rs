@@ -48,25 +48,17 @@ const QUALITY_FAST: c_int = 4;
 const FAST_SINCE: c_int = 20300;
 
 type Handle = *mut c_void;
+type Name = *const c_char;
 type NewDevice = unsafe extern "C" fn(c_int) -> Handle;
 type OfHandle = unsafe extern "C" fn(Handle);
-type NewFilter = unsafe extern "C" fn(Handle, *const c_char) -> Handle;
-type SetImage = unsafe extern "C" fn(
-    Handle,
-    *const c_char,
-    *mut c_void,
-    c_int,
-    usize,
-    usize,
-    usize,
-    usize,
-    usize,
-);
-type SetBool = unsafe extern "C" fn(Handle, *const c_char, bool);
-type SetInt = unsafe extern "C" fn(Handle, *const c_char, c_int);
+type NewFilter = unsafe extern "C" fn(Handle, Name) -> Handle;
+type SetImage =
+    unsafe extern "C" fn(Handle, Name, *mut c_void, c_int, usize, usize, usize, usize, usize);
+type SetBool = unsafe extern "C" fn(Handle, Name, bool);
+type SetInt = unsafe extern "C" fn(Handle, Name, c_int);
 type Progress = unsafe extern "C" fn(*mut c_void, f64) -> bool;
 type SetProgress = unsafe extern "C" fn(Handle, Progress, *mut c_void);
-type GetInt = unsafe extern "C" fn(Handle, *const c_char) -> c_int;
+type GetInt = unsafe extern "C" fn(Handle, Name) -> c_int;
 type GetError = unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int;
 
 /// The library, if this machine has it; loaded once and for good.
