@@ -1,7 +1,7 @@
 //! A small picture in the surfaces of a large one, whatever light fell on those: joint bilateral upsampling (Kopf et al.,
 //! 2007) of light without albedo.
 
-use glam::{Vec3, Vec4};
+use glam::{U16Vec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::guides::{ALBEDO_TOLERANCE, Guide, around};
@@ -144,10 +144,8 @@ impl FineGuides {
         extent: [f32; 2],
     ) -> Image {
         let size = [small.width, small.height].map(|side| side as usize);
-        let guides: Vec<Guide> = (0..small.pixels.len())
-            .into_par_iter()
-            .map(|index| Guide::of(samples, index))
-            .collect();
+        let guide = |index| Guide::of(samples, index);
+        let guides: Vec<Guide> = (0..small.pixels.len()).into_par_iter().map(guide).collect();
         let edited = self.edited(&guides, size, extent);
         let quad = |index: usize| {
             let [x, y] = [index % size[0], index / size[0]];
@@ -234,14 +232,12 @@ impl FineGuides {
         };
         let range = |index: usize| {
             let [x, y] = [index % width, index / width];
-            let (mut least, mut most) = ([u16::MAX; 3], [0; 3]);
+            let (mut least, mut most) = (U16Vec3::MAX, U16Vec3::ZERO);
             for row in fine(1, y, self.height)..fine(1, y + 1, self.height) {
                 let row = &self.pixels[row * columns..][..columns];
                 for pixel in &row[fine(0, x, self.width)..fine(0, x + 1, self.width)] {
-                    for i in 0..3 {
-                        least[i] = least[i].min(pixel.albedo[i]);
-                        most[i] = most[i].max(pixel.albedo[i]);
-                    }
+                    let albedo = U16Vec3::from(pixel.albedo);
+                    (least, most) = (least.min(albedo), most.max(albedo));
                 }
             }
             (least, most)
@@ -250,14 +246,12 @@ impl FineGuides {
         // Samples of a pixel lie in those beside it, too.
         let is_edited = |index: usize| {
             let albedo = guides[index].albedo * f32::from(u16::MAX);
-            (0..3).any(|i| {
-                let near = around(index, [width, height], 1).map(|(other, _)| ranges[other]);
-                let (least, most) = near.fold((u16::MAX, 0), |(low, high), (least, most)| {
-                    (low.min(least[i]), high.max(most[i]))
-                });
-                let tolerance = ALBEDO_ERROR * f32::from(u16::MAX);
-                !(f32::from(least) - tolerance..=f32::from(most) + tolerance).contains(&albedo[i])
-            })
+            let near = around(index, [width, height], 1).map(|(other, _)| ranges[other]);
+            let join = |(a, b): (U16Vec3, U16Vec3), (c, d)| (a.min(c), b.max(d));
+            let (least, most) = near.fold((U16Vec3::MAX, U16Vec3::ZERO), join);
+            let tolerance = ALBEDO_ERROR * f32::from(u16::MAX);
+            let is_above = albedo.cmpge(least.as_vec3() - tolerance);
+            !(is_above & albedo.cmple(most.as_vec3() + tolerance)).all()
         };
         (0..guides.len()).into_par_iter().map(is_edited).collect()
     }
