@@ -63,8 +63,7 @@ impl Context<'_> {
             let is_new = run.points.iter().all(|p| p.errors.is_some())
                 && reference.1.is_some()
                 && run.reference_pictures == reference.1;
-            let pictures = if is_new { None } else { self.pictures(key, run) };
-            if let Some(pictures) = pictures {
+            if !is_new && let Some(pictures) = self.pictures(key, run) {
                 run.evaluate(&pictures, &reference)?;
                 self.store.write(key, run)?;
             }
