@@ -66,8 +66,7 @@ impl Instance {
 /// Sums of the absolute values in each row of a map's matrix: how far each coordinate moves at most as
 /// all of what is mapped move by one.
 fn row_sums(map: DAffine3) -> DVec3 {
-    let m = map.matrix3;
-    m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()
+    map.matrix3.abs() * DVec3::ONE
 }
 
 /// An instance on a GPU: rows of both maps, and what walks want of it.
@@ -99,8 +98,7 @@ impl Placed {
     /// `root` and `node` are those of the mesh's tree, `start` is the mesh's first triangle.
     pub(super) fn new(instance: &Instance, start: u32, root: Reference, node: &Node) -> Self {
         let map = instance.world_from_mesh;
-        let exact =
-            DAffine3 { matrix3: map.matrix3.as_dmat3(), translation: map.translation.as_dvec3() };
+        let exact = map.as_daffine3();
         let inverse = exact.inverse();
         let mut extent = DVec3::ZERO;
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -113,11 +111,7 @@ impl Placed {
                 (low, high) = (low.min(corner), high.max(corner));
             }
         }
-        let m = exact.matrix3;
-        let reach = m.x_axis.abs() * extent.x
-            + m.y_axis.abs() * extent.y
-            + m.z_axis.abs() * extent.z
-            + exact.translation.abs();
+        let reach = exact.matrix3.abs() * extent + exact.translation.abs();
         // Triangles are placed in f32: products and sums are off by less than 4 * 2^-24 of the reach.
         let rounding = reach * (8.0 * 0.5_f64.powi(24));
         Self {
@@ -127,7 +121,7 @@ impl Placed {
             stretch: row_sums(inverse).as_vec3(),
             reach: reach.max_element() as f32,
             extent: extent.max_element() as f32,
-            mirrors: m.determinant() < 0.0,
+            mirrors: exact.matrix3.determinant() < 0.0,
             mesh: instance.mesh,
             shift: instance.first.wrapping_sub(start),
             root,
@@ -175,9 +169,8 @@ impl Placed {
     /// As `shaders/instances.wgsl` reads it; `root` is that of the mesh's tree there.
     pub(super) fn words(&self, root: u32) -> InstanceWords {
         let row = |map: &Affine3A, axis: usize| {
-            let m = map.matrix3;
-            let row = [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis], map.translation[axis]];
-            row.map(f32::to_bits)
+            let row = map.matrix3.row(axis).extend(map.translation[axis]);
+            row.to_array().map(f32::to_bits)
         };
         let [x, y, z, origin] = self.columns.map(Vec3A::from);
         let there = Affine3A { matrix3: Mat3A::from_cols(x, y, z), translation: origin };

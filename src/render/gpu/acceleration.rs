@@ -125,10 +125,7 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result
     tlas[0] = Some(wgpu::TlasInstance::new(&trees[0], IDENTITY, 0, 0xff));
     for (number, instance) in (1..).zip(scene.instances.iter()) {
         let map = instance.placing.affine();
-        let row = |axis: usize| {
-            let m = map.matrix3;
-            [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis], map.translation[axis]]
-        };
+        let row = |axis| map.matrix3.row(axis).extend(map.translation[axis]).to_array();
         let rows = [row(0), row(1), row(2)].as_flattened().try_into().unwrap_or(IDENTITY);
         let tree = &trees[instance.mesh as usize + 1];
         tlas[number as usize] = Some(wgpu::TlasInstance::new(tree, rows, number, 0xff));
