@@ -35,24 +35,15 @@ impl Bound {
     }
 
     fn bind(&self, gpu: &Gpu, buffers: &Buffers) -> Result<wgpu::BindGroup> {
-        let missing = |name| Error::new(format!("the shader's {name} was not uploaded"));
-        let bindings = &self.pipeline.program.bindings;
-        let mut views = Vec::new();
-        for binding in bindings {
-            if let Binding::Array(array) = binding {
-                let texture = buffers.array(array.name).ok_or_else(|| missing(array.name))?;
-                views.push(texture.create_view(&wgpu::TextureViewDescriptor::default()));
-            }
-        }
-        let mut next_view = views.iter();
+        let missing = |name: &str| Error::new(format!("the shader's {name} was not uploaded"));
         let mut entries = Vec::new();
-        for (binding, index) in bindings.iter().zip(0..) {
+        for (binding, index) in self.pipeline.program.bindings.iter().zip(0..) {
             let resource = match binding {
                 Binding::Buffer { name, .. } => {
                     buffers.get(name).ok_or_else(|| missing(name))?.as_entire_binding()
                 }
                 Binding::Array(array) => wgpu::BindingResource::TextureView(
-                    next_view.next().ok_or_else(|| missing(array.name))?,
+                    buffers.array(array.name).ok_or_else(|| missing(array.name))?,
                 ),
                 Binding::Tree => wgpu::BindingResource::AccelerationStructure(
                     buffers.tree.as_ref().ok_or_else(|| missing("tree"))?,

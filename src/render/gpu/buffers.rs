@@ -17,7 +17,8 @@ use crate::error::{Error, Result};
 pub(super) struct Buffers {
     pub(super) gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
-    arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
+    /// With the bytes that each takes.
+    arrays: BTreeMap<&'static str, (wgpu::TextureView, u64)>,
     /// The driver's tree of the scene, if rays are traced by the device's own queries.
     pub(super) tree: Option<wgpu::Tlas>,
     /// Texels of a row of every array, as a power of two.
@@ -67,9 +68,9 @@ impl Buffers {
         self.by_name.get(name)
     }
 
-    /// The texture of an array.
-    pub(super) fn array(&self, name: &str) -> Option<&wgpu::Texture> {
-        self.arrays.get(name).map(|(texture, _)| texture)
+    /// The view of an array's texture.
+    pub(super) fn array(&self, name: &str) -> Option<&wgpu::TextureView> {
+        self.arrays.get(name).map(|(view, _)| view)
     }
 
     /// Bytes of all buffers and arrays.
@@ -151,7 +152,8 @@ impl Buffers {
         let texture = texture.map_err(|e| for_want_of(bytes, what, &e))?;
         self.upload(&texture, kind.texel_bytes(), parts)?;
         self.by_name.remove(name);
-        self.arrays.insert(name, (texture, bytes));
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        self.arrays.insert(name, (view, bytes));
         self.version += 1;
         Ok(())
     }
