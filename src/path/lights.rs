@@ -151,12 +151,9 @@ impl LocalLights {
             probability * area_to_solid_angle(&corners, direction, distance * distance)?;
         let point = point_at(&Hit { t: distance, triangle, barycentric }, direction);
         let radiance = emitted(scene, &point, -direction);
-        (radiance.max_element() > 0.0).then(|| LightSample {
-            direction,
-            distance,
-            radiance_over_pdf: radiance / pdf_solid_angle,
-            pdf_solid_angle,
-        })
+        let radiance_over_pdf = radiance / pdf_solid_angle;
+        let sample = LightSample { direction, distance, radiance_over_pdf, pdf_solid_angle };
+        (radiance.max_element() > 0.0).then_some(sample)
     }
 
     /// Pdf in solid angle of [`Self::sample`] for the point of `triangle` at the end of `way`: a unit direction and a
@@ -238,25 +235,21 @@ fn punctual_power(light: &PunctualLight, scene_radius: f32) -> f64 {
 }
 
 fn sample_punctual(light: &PunctualLight, position: Vec3, probability: f32) -> Option<LightSample> {
-    if light.kind == PunctualKind::Directional {
-        return Some(LightSample {
-            direction: -light.direction,
-            distance: f32::INFINITY,
-            radiance_over_pdf: light.intensity / probability,
-            pdf_solid_angle: f32::INFINITY,
-        });
-    }
-    let to_light = light.position - position;
-    let distance = to_light.length();
-    let direction = to_light / distance;
-    let attenuation = spot_attenuation(light, direction) * range_attenuation(light, distance);
-    let irradiance = light.intensity * attenuation / (distance * distance);
-    (irradiance.is_finite() && irradiance.max_element() > 0.0).then(|| LightSample {
-        direction,
-        distance,
-        radiance_over_pdf: irradiance / probability,
-        pdf_solid_angle: f32::INFINITY,
-    })
+    let (direction, distance, irradiance) = if light.kind == PunctualKind::Directional {
+        (-light.direction, f32::INFINITY, light.intensity)
+    } else {
+        let to_light = light.position - position;
+        let distance = to_light.length();
+        let direction = to_light / distance;
+        let attenuation = spot_attenuation(light, direction) * range_attenuation(light, distance);
+        let irradiance = light.intensity * attenuation / (distance * distance);
+        if !irradiance.is_finite() || irradiance.max_element() <= 0.0 {
+            return None;
+        }
+        (direction, distance, irradiance)
+    };
+    let radiance_over_pdf = irradiance / probability;
+    Some(LightSample { direction, distance, radiance_over_pdf, pdf_solid_angle: f32::INFINITY })
 }
 
 /// Smooth cone of `KHR_lights_punctual`.
