@@ -63,18 +63,15 @@ impl ReadyMaterial {
     /// The scattering at a point of this material: the one that is ready, unless the point has
     /// parameters of its own.
     pub(super) fn bsdf(&self, point: &SurfacePoint<'_>) -> Cow<'_, Bsdf> {
-        match &point.parameters {
-            Cow::Borrowed(_) if point.front_face => Cow::Borrowed(&self.front),
-            Cow::Borrowed(_) => Cow::Borrowed(self.back.as_deref().unwrap_or(&self.front)),
-            Cow::Owned(own) => Cow::Owned(Bsdf::new(own, point.front_face)),
-        }
+        self.bsdf_from(point, point.front_face)
     }
 
-    /// The same as if it were seen from the front.
-    pub(super) fn bsdf_in_front(&self, point: &SurfacePoint<'_>) -> Cow<'_, Bsdf> {
+    /// The same as if it were seen from its front, or from its back.
+    pub(super) fn bsdf_from(&self, point: &SurfacePoint<'_>, front: bool) -> Cow<'_, Bsdf> {
         match &point.parameters {
-            Cow::Borrowed(_) => Cow::Borrowed(&self.front),
-            Cow::Owned(own) => Cow::Owned(Bsdf::new(own, true)),
+            Cow::Borrowed(_) if front => Cow::Borrowed(&self.front),
+            Cow::Borrowed(_) => Cow::Borrowed(self.back.as_deref().unwrap_or(&self.front)),
+            Cow::Owned(own) => Cow::Owned(Bsdf::new(own, front)),
         }
     }
 

@@ -149,7 +149,7 @@ impl GlassWalk {
                 let wo = point.shading_frame.local_from_world(-ray.direction);
                 if course == Course::Straight {
                     let [_, transmitted] =
-                        material.bsdf_in_front(&point).viewed_from(wo).smooth_shares();
+                        material.bsdf_from(&point, true).viewed_from(wo).smooth_shares();
                     walk.transmittance *= transmitted;
                 } else {
                     let refracted = material.bsdf(&point).refracted(wo);
