@@ -37,12 +37,6 @@ fn spans(facets: &[Facet]) -> Vec<Range<f64>> {
     facets.iter().map(&mut span).collect()
 }
 
-/// Parts that a facet has a share of.
-fn parts_of(span: &Range<f64>) -> Range<usize> {
-    let first = (span.start as usize).min(PARTS - 1);
-    first..(span.end.ceil() as usize).clamp(first + 1, PARTS)
-}
-
 /// Mean radiance that leaves the front and the back of a part of the area, as brightness. A solid's back is inside.
 fn radiance_of_part(
     tracer: &PathTracer<'_>,
@@ -74,7 +68,7 @@ fn radiance_of_part(
     radiance
 }
 
-impl PathTracer<'_> {
+impl<'a> PathTracer<'a> {
     /// What paths may aim at in the scene, weighed by the light that is found on it; `None` if there is nothing.
     pub(crate) fn aim_targets(&self) -> Option<AimTargets> {
         let scene = &self.world.scene;
@@ -90,7 +84,8 @@ impl PathTracer<'_> {
         };
         let all = [0, 1].map(|side| SHARE_OF_ALL * mean(&of_parts, side));
         let of_facet = |span: &Range<f64>| {
-            let parts = &of_parts[parts_of(span)];
+            let first = (span.start as usize).min(PARTS - 1);
+            let parts = &of_parts[first..(span.end.ceil() as usize).clamp(first + 1, PARTS)];
             [0, 1].map(|side| all[side] + (1.0 - SHARE_OF_ALL) * mean(parts, side))
         };
         let radiances: Vec<[f32; 2]> = spans.iter().map(of_facet).collect();
@@ -121,9 +116,7 @@ impl PathTracer<'_> {
         }
         [from_targets, luminance(path.radiance)]
     }
-}
 
-impl<'a> PathTracer<'a> {
     /// How a path in air aims from a vertex; `None` if it does not.
     pub(super) fn aiming_from(&self, vertex: &Vertex<'_>) -> Option<&'a Aiming> {
         let aiming = self.lights.aiming.as_ref()?;

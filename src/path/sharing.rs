@@ -53,6 +53,21 @@ impl SharedTile {
     pub fn most_map_samples(&self, bounces: u32) -> u32 {
         Self::MAP_SAMPLES + self.continuations * bounces.saturating_sub(1)
     }
+
+    /// The tiles of sample `sample` of each pixel: elsewhere for each, so that no edge of a tile shows.
+    pub(crate) fn tiling(&self, size: [u32; 2], seed: u32, sample: u32) -> Tiling {
+        let seed = hash(seed ^ hash(sample ^ TILE_SEED));
+        let before = [seed, seed >> 16].map(|bits| bits % self.side);
+        Tiling { side: self.side, size, before, seed }
+    }
+
+    /// Whether a pixel keeps its second vertex.
+    fn is_owner(&self, [x, y]: [u32; 2], seed: u32) -> bool {
+        let side = self.owner_side;
+        let square = (y / side) * self.side.div_ceil(side) + x / side;
+        let chosen = hash(seed.wrapping_add(square)) % (side * side);
+        (y % side) * side + x % side == chosen
+    }
 }
 
 /// Where the path of a pixel begins.
@@ -196,23 +211,6 @@ impl Tiling {
     }
 }
 
-impl SharedTile {
-    /// The tiles of sample `sample` of each pixel: elsewhere for each, so that no edge of a tile shows.
-    pub(crate) fn tiling(&self, size: [u32; 2], seed: u32, sample: u32) -> Tiling {
-        let seed = hash(seed ^ hash(sample ^ TILE_SEED));
-        let before = [seed, seed >> 16].map(|bits| bits % self.side);
-        Tiling { side: self.side, size, before, seed }
-    }
-
-    /// Whether a pixel keeps its second vertex.
-    fn is_owner(&self, [x, y]: [u32; 2], seed: u32) -> bool {
-        let side = self.owner_side;
-        let square = (y / side) * self.side.div_ceil(side) + x / side;
-        let chosen = hash(seed.wrapping_add(square)) % (side * side);
-        (y % side) * side + x % side == chosen
-    }
-}
-
 impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
@@ -340,11 +338,8 @@ impl Second<'_, '_> {
             let distance = squared.sqrt();
             let direction = to_second / distance;
             let cosine = normal.map_or(1.0, |normal| -normal.dot(direction));
-            if !(cosine > 0.0 && squared > 0.0) {
-                continue;
-            }
             // Connections start from the vertex.
-            if first.vertex.scatterer.lifts(direction) {
+            if !(cosine > 0.0 && squared > 0.0) || first.vertex.scatterer.lifts(direction) {
                 continue;
             }
             let scattered = first.vertex.scatterer.scattered(direction);
