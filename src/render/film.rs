@@ -32,16 +32,6 @@ pub struct Surface {
     hits: f64,
 }
 
-impl Surface {
-    /// Mean albedo, unit normal and distance in metres, of so many samples of the pixel.
-    fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
-        let albedo = self.albedo / f64::from(samples.max(1));
-        let normal = self.normal.normalize_or_zero();
-        let depth = self.depth.max(0.0) / self.hits.max(1.0);
-        (albedo.as_vec3().to_array(), normal.as_vec3().to_array(), depth as f32)
-    }
-}
-
 /// The picture so far.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Film {
@@ -111,6 +101,14 @@ impl Pixel {
 }
 
 impl Surface {
+    /// Mean albedo, unit normal and distance in metres, of so many samples of the pixel.
+    fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
+        let albedo = self.albedo / f64::from(samples.max(1));
+        let normal = self.normal.normalize_or_zero();
+        let depth = self.depth.max(0.0) / self.hits.max(1.0);
+        (albedo.as_vec3().to_array(), normal.as_vec3().to_array(), depth as f32)
+    }
+
     /// Adds the first hit of one sample, or that there was none. One that says nothing counts as much as the others
     /// on average, those that come first as much as the first that says something.
     pub fn add(&mut self, result: &PathResult) {
@@ -359,22 +357,7 @@ impl Film {
             depth: means().map(|(_, _, depth)| depth).collect(),
         })
     }
-}
 
-/// A part of the film for one thread.
-pub(super) struct FilmTile<'a> {
-    /// Column and row of its first pixel, were none of it outside of the picture.
-    pub(super) corner: [i64; 2],
-    rows: Vec<(&'a mut [Pixel], &'a mut [Surface])>,
-}
-
-/// A pixel of the film and what is seen in it, if that is asked for.
-pub(super) struct FilmPixel<'a> {
-    pixel: &'a mut Pixel,
-    surface: Option<&'a mut Surface>,
-}
-
-impl Film {
     /// Cuts the film into tiles of this size, row after row of tiles; the first begins `before` columns
     /// and rows before the picture, which is less than a tile.
     pub(super) fn tiles(&mut self, width: u32, height: u32, before: [u32; 2]) -> Vec<FilmTile<'_>> {
@@ -404,6 +387,19 @@ impl Film {
         }
         tiles
     }
+}
+
+/// A part of the film for one thread.
+pub(super) struct FilmTile<'a> {
+    /// Column and row of its first pixel, were none of it outside of the picture.
+    pub(super) corner: [i64; 2],
+    rows: Vec<(&'a mut [Pixel], &'a mut [Surface])>,
+}
+
+/// A pixel of the film and what is seen in it, if that is asked for.
+pub(super) struct FilmPixel<'a> {
+    pixel: &'a mut Pixel,
+    surface: Option<&'a mut Surface>,
 }
 
 impl FilmTile<'_> {
