@@ -176,11 +176,6 @@ impl Interface {
         self.ggx.is_smooth() || self.is_absent() || (self.transmits_delta() && reflects_nothing)
     }
 
-    /// Whether there is metal that is no mirror, or what an infinite index makes one (specular-glossiness).
-    pub(super) fn is_rough_metal(&self, p: &SurfaceParameters) -> bool {
-        (p.metallic > 0.0 || p.ior == 0.0) && !self.ggx.is_smooth()
-    }
-
     /// The glass, if it is spread on its way through.
     pub(super) fn rough_glass(&self) -> Option<RoughGlass> {
         (self.glass > 0.0 && !self.transmits_delta()).then(|| RoughGlass {

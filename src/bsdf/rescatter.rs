@@ -77,7 +77,9 @@ impl Rescatter {
         terms: AlbedoTerms,
         interface: &Interface,
     ) -> Option<Self> {
-        let (is_metal, glass) = (interface.is_rough_metal(p), interface.rough_glass());
+        // Metal that is no mirror, or what an infinite index makes one (specular-glossiness).
+        let is_metal = (p.metallic > 0.0 || p.ior == 0.0) && !interface.ggx.is_smooth();
+        let glass = interface.rough_glass();
         if !is_metal && glass.is_none() {
             return None;
         }
