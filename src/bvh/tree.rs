@@ -1,7 +1,5 @@
 //! The tree and how it is walked.
 
-use std::mem::size_of_val;
-
 use glam::Vec3;
 
 #[cfg(target_arch = "x86_64")]
