@@ -34,23 +34,15 @@ impl BsdfSample {
     /// A direction, given the scattering and the density there.
     pub(super) fn spread(wi: Vec3, (value, pdf_solid_angle): (Vec3, f32)) -> Option<Self> {
         let weight = value / pdf_solid_angle;
-        (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(Self {
-            wi,
-            weight,
-            pdf_solid_angle,
-            is_delta: false,
-            is_transmission: wi.z < 0.0,
-        })
+        let is_transmission = wi.z < 0.0;
+        let sample = Self { wi, weight, pdf_solid_angle, is_delta: false, is_transmission };
+        (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(sample)
     }
 
     /// A perfect reflection or refraction.
     pub(super) fn delta(wi: Vec3, weight: Vec3) -> Option<Self> {
-        (weight.is_finite() && weight != Vec3::ZERO).then_some(Self {
-            wi,
-            weight,
-            pdf_solid_angle: 1.0,
-            is_delta: true,
-            is_transmission: wi.z < 0.0,
-        })
+        let (pdf_solid_angle, is_transmission) = (1.0, wi.z < 0.0);
+        let sample = Self { wi, weight, pdf_solid_angle, is_delta: true, is_transmission };
+        (weight.is_finite() && weight != Vec3::ZERO).then_some(sample)
     }
 }

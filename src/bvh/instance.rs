@@ -139,12 +139,10 @@ impl Placed {
     /// there is of boxes in this space comes on top.
     #[inline(always)]
     pub(super) fn brought(&self, ray: &Ray, extent: f32) -> (Ray, Vec3) {
-        let there = Ray {
-            origin: self.mesh_from_world.transform_point3(ray.origin),
-            direction: self.mesh_from_world.transform_vector3(ray.direction),
-            ..*ray
-        };
+        let origin = self.mesh_from_world.transform_point3(ray.origin);
+        let direction = self.mesh_from_world.transform_vector3(ray.direction);
         let way = ray.origin.abs().max_element() + extent + self.reach;
+        let there = Ray { origin, direction, ..*ray };
         (there, self.stretch * (way * (32.0 * 0.5_f32.powi(24))))
     }
 

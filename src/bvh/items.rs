@@ -35,12 +35,9 @@ impl<'a> Items<'a> {
     pub(super) fn new(sources: Sources<'a>, triangles: Range<u32>, placed: &'a [Placed]) -> Self {
         let has_area = |triangle: &u32| sources.has_area(*triangle);
         let is_there = |number: &u32| placed[*number as usize].bounds.0.is_finite();
-        Self {
-            sources,
-            triangles: triangles.into_par_iter().filter(has_area).collect(),
-            instances: (0..placed.len() as u32).filter(is_there).collect(),
-            placed,
-        }
+        let triangles = triangles.into_par_iter().filter(has_area).collect();
+        let instances = (0..placed.len() as u32).filter(is_there).collect();
+        Self { sources, triangles, instances, placed }
     }
 
     pub(super) fn get(&self, primitive: u32) -> Item {

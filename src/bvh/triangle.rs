@@ -50,11 +50,8 @@ impl BlockHits {
     /// The hit in lane `lane`, which is set in the mask.
     #[inline(always)]
     pub(super) fn hit(&self, block: &Block, lane: usize) -> Hit {
-        Hit {
-            t: self.t[lane],
-            triangle: block.triangles[lane],
-            barycentric: Vec2::new(self.barycentric[0][lane], self.barycentric[1][lane]),
-        }
+        let barycentric = Vec2::new(self.barycentric[0][lane], self.barycentric[1][lane]);
+        Hit { t: self.t[lane], triangle: block.triangles[lane], barycentric }
     }
 }
 
@@ -103,11 +100,8 @@ pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max:
     if mask == 0 {
         return BlockHits::NONE;
     }
-    BlockHits {
-        mask,
-        t: t.store(),
-        barycentric: [edges[1].div(determinant).store(), edges[2].div(determinant).store()],
-    }
+    let barycentric = [edges[1].div(determinant).store(), edges[2].div(determinant).store()];
+    BlockHits { mask, t: t.store(), barycentric }
 }
 
 /// Bound on the error of a distance, in units of how far the vertices lie along the ray: 16 * 2^-24.

@@ -177,13 +177,9 @@ impl Environment {
         memory::check(2 * size_of_val(&*map.pixels) as u64)
             .map_err(|cause| Error::new(format!("a map with another sun {cause}")))?;
         let (tile_columns, tile_rows) = self.tile_grid();
-        let options = EnvironmentOptions {
-            table: self.table_kind,
-            tile_columns,
-            tile_rows,
-            intensity: self.intensity,
-            ..EnvironmentOptions::default()
-        };
+        let (table, intensity) = (self.table_kind, self.intensity);
+        let options =
+            EnvironmentOptions { table, tile_columns, tile_rows, intensity, ..Default::default() };
         Ok(Self { rotation_turns: self.rotation_turns, ..Self::new(map, &options)? })
     }
 

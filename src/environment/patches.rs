@@ -41,11 +41,8 @@ impl PatchRows {
             let is_upper = is_upper(row, count);
             let distance = |edge| pole_distance(edge, height, is_upper);
             let (top, bottom) = (distance(row), distance(row + 1));
-            PatchRow {
-                top: top as f32,
-                extent: (bottom - top) as f32,
-                solid_angle: solid_angle(width, height, row) as f32,
-            }
+            let solid_angle = solid_angle(width, height, row) as f32;
+            PatchRow { top: top as f32, extent: (bottom - top) as f32, solid_angle }
         });
         Self { rows: rows.collect() }
     }

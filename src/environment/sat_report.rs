@@ -105,12 +105,8 @@ pub fn sat_report(map: &Image, timed_samples: u32) -> Result<SatReport> {
             table_bytes: table.memory_bytes() as u64,
         }
     });
-    Ok(SatReport {
-        width: map.width,
-        height: map.height,
-        lit_share: lit as f64 / patches,
-        rows: table_rows.to_vec(),
-    })
+    let lit_share = lit as f64 / patches;
+    Ok(SatReport { width: map.width, height: map.height, lit_share, rows: table_rows.to_vec() })
 }
 
 /// Errors of a table: sums over patches.

@@ -375,11 +375,8 @@ impl Second<'_, '_> {
             let area = cosine / squared;
             let owner_probability = 1.0 / (tile.owner_side * tile.owner_side) as f32;
             density += owner_probability * pdf_solid_angle * area * crossing.density;
-            connections.push(Connection {
-                pixel,
-                direction: -direction,
-                weight: carried * area * crossing.weight,
-            });
+            let weight = carried * area * crossing.weight;
+            connections.push(Connection { pixel, direction: -direction, weight });
         }
         if density <= 0.0 {
             return;

@@ -153,13 +153,9 @@ impl<'v> SurfaceScatterer<'v> {
         let direction = self.shading_frame.world_from_local(sample.wi).normalize();
         let is_through = sample.is_transmission;
         let pdf_solid_angle = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
-        (self.sides.is_above(direction) != is_through).then_some(Onward {
-            direction,
-            weight: sample.weight,
-            pdf_solid_angle,
-            is_through,
-            aim: Aim::None,
-        })
+        let weight = sample.weight;
+        let onward = Onward { direction, weight, pdf_solid_angle, is_through, aim: Aim::None };
+        (self.sides.is_above(direction) != is_through).then_some(onward)
     }
 }
 
