@@ -471,17 +471,12 @@ pub(crate) fn pack_radiance(rgb: [f32; 3]) -> [u32; 2] {
         let units = 2.0_f64.powi(BITS - 1 + 127 - stored);
         rgb.map(|value| (f64::from(value) * units).round() as u32)
     };
-    let mut exponent = stored;
-    let mut mantissas = pack(exponent);
-    if mantissas.iter().any(|m| *m >= 1 << BITS) {
-        if exponent == 254 {
-            mantissas = mantissas.map(|m| m.min((1 << BITS) - 1));
-        } else {
-            exponent += 1;
-            mantissas = pack(exponent);
-        }
-    }
-    let [r, g, b] = mantissas;
+    let is_rounded_up = |mantissas: &[u32; 3]| mantissas.iter().any(|m| *m >= 1 << BITS);
+    let (exponent, [r, g, b]) = match pack(stored) {
+        mantissas if !is_rounded_up(&mantissas) => (stored, mantissas),
+        mantissas if stored == 254 => (stored, mantissas.map(|m| m.min((1 << BITS) - 1))),
+        _ => (stored + 1, pack(stored + 1)),
+    };
     [r | g << 18, g >> 14 | b << 4 | (exponent as u32) << 24]
 }
 
