@@ -164,12 +164,9 @@ impl Film {
     /// A black film; `layers` asks for albedo, normal and depth too.
     pub fn new(width: u32, height: u32, layers: bool) -> Self {
         let count = width as usize * height as usize;
-        Self {
-            width,
-            height,
-            pixels: vec![Pixel::default(); count],
-            surfaces: vec![Surface::default(); if layers { count } else { 0 }],
-        }
+        let pixels = vec![Pixel::default(); count];
+        let surfaces = vec![Surface::default(); if layers { count } else { 0 }];
+        Self { width, height, pixels, surfaces }
     }
 
     /// Counts so many samples of every pixel more, without their light: others take them. Only for

@@ -37,13 +37,11 @@ impl SurfaceMap {
     pub fn of(world: &World, view: &View) -> Self {
         let rays = view.rays();
         let width = view.width.max(1);
-        let spots = (0..width * view.height)
-            .into_par_iter()
-            .map(|i| {
-                let pixel = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-                look(world, rays.ray(pixel, Vec2::splat(0.5)))
-            })
-            .collect();
+        let spot = |i: u32| {
+            let pixel = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+            look(world, rays.ray(pixel, Vec2::splat(0.5)))
+        };
+        let spots = (0..width * view.height).into_par_iter().map(spot).collect();
         Self { width: view.width, height: view.height, spots }
     }
 }
@@ -53,11 +51,8 @@ pub(crate) fn look(world: &World, mut ray: Ray) -> Option<Spot> {
     for _ in 0..MAX_PASSES {
         let point = world.point(&world.closest_hit(&ray, true)?, ray.direction);
         if world.straight_through(&point, ray.direction).max_element() < 0.5 {
-            return Some(Spot {
-                position: point.position,
-                normal: point.geometric_normal,
-                material: point.material,
-            });
+            let (position, normal) = (point.position, point.geometric_normal);
+            return Some(Spot { position, normal, material: point.material });
         }
         ray.origin = offset_origin(point.position, -point.geometric_normal);
     }

@@ -135,11 +135,9 @@ impl View {
                 (u64::from(pixels[i]) * u64::from(new[i]) / u64::from(old[i].max(1))) as u32
             })
         };
-        if let Some(crop) = &mut view.crop {
-            *crop = Crop {
-                corner: scaled(crop.corner),
-                whole: scaled(crop.whole).map(|pixels| pixels.max(1)),
-            };
+        if let Some(Crop { corner, whole }) = &mut view.crop {
+            *corner = scaled(*corner);
+            *whole = scaled(*whole).map(|pixels| pixels.max(1));
         }
         view
     }

@@ -108,13 +108,9 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result
         })
         .collect();
     let (trees, mut tlas) = gpu.make(|device| {
-        let lower = wgpu::CreateBlasDescriptor { label: Some("scene"), flags, update_mode };
-        let upper = wgpu::CreateTlasDescriptor {
-            label: Some("scene"),
-            max_instances: 1 + scene.instances.len() as u32,
-            flags,
-            update_mode,
-        };
+        let (label, max_instances) = (Some("scene"), 1 + scene.instances.len() as u32);
+        let lower = wgpu::CreateBlasDescriptor { label, flags, update_mode };
+        let upper = wgpu::CreateTlasDescriptor { label, max_instances, flags, update_mode };
         let trees = sizes.iter().map(|sizes| {
             let descriptors = sizes.to_vec();
             device.create_blas(&lower, BlasGeometrySizeDescriptors::Triangles { descriptors })

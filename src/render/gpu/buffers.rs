@@ -198,16 +198,11 @@ impl Buffers {
         }
         let mut place = texture.as_image_copy();
         place.origin.y = row;
-        self.gpu.queue.write_texture(
-            place,
-            bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(row_bytes as u32),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d { width: 1 << self.width_log2, height: rows, depth_or_array_layers: 1 },
-        );
+        let bytes_per_row = Some(row_bytes as u32);
+        let layout = wgpu::TexelCopyBufferLayout { bytes_per_row, ..Default::default() };
+        let size =
+            wgpu::Extent3d { width: 1 << self.width_log2, height: rows, ..Default::default() };
+        self.gpu.queue.write_texture(place, bytes, layout, size);
         self.gpu.finish_copies()?;
         Ok(rows)
     }

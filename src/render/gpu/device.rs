@@ -51,21 +51,16 @@ pub(crate) const NO_GPU: &str = "no GPU: neither Vulkan, Metal, DX12 nor OpenGL 
 
 /// All adapters of this machine, the best one first.
 pub fn adapters() -> Vec<AdapterFacts> {
-    enumerate(&instance(PRIMARY | Backends::GL, None), None)
-        .into_iter()
-        .map(|(facts, _)| facts)
-        .collect()
+    let found = enumerate(&instance(PRIMARY | Backends::GL, None), None);
+    found.into_iter().map(|(facts, _)| facts).collect()
 }
 
 /// What is asked first: OpenGL is only the fallback.
 const PRIMARY: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
 
 fn instance(backends: Backends, display: Option<Box<dyn WgpuHasDisplayHandle>>) -> Instance {
-    Instance::new(InstanceDescriptor {
-        backends,
-        display,
-        ..InstanceDescriptor::new_without_display_handle()
-    })
+    let usual = InstanceDescriptor::new_without_display_handle();
+    Instance::new(InstanceDescriptor { backends, display, ..usual })
 }
 
 /// The adapters that can compute, and draw on the surface if there is one; the best one first.

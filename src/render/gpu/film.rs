@@ -85,14 +85,9 @@ impl Sums {
     /// Where it is.
     pub(super) fn on_device(&self, buffers: &Buffers) -> Option<DeviceFilm> {
         let [sum, _, counts] = PIXELS.map(|name| buffers.get(name).cloned());
-        Some(DeviceFilm {
-            sum: sum?,
-            counts: counts?,
-            surfaces: buffers.get(SURFACES[0]).filter(|_| self.layers).cloned(),
-            width: self.width,
-            height: self.height,
-            scale: self.scale,
-        })
+        let Self { width, height, layers, scale, .. } = *self;
+        let surfaces = buffers.get(SURFACES[0]).filter(|_| layers).cloned();
+        Some(DeviceFilm { sum: sum?, counts: counts?, surfaces, width, height, scale })
     }
 
     /// Rays of all pixels when they were read last.

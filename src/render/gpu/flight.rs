@@ -129,14 +129,9 @@ impl Flights {
             // Whether it worked shows when it is read.
             staging.map_async(wgpu::MapMode::Read, .., |_| {});
         }
-        self.under_way.push_back(Flight {
-            submission,
-            kernel: job.kernel,
-            units: job.units,
-            submitted,
-            slot,
-            lanes: staging.map(|_| job.groups * GROUP as u32),
-        });
+        let (kernel, units) = (job.kernel, job.units);
+        let lanes = staging.map(|_| job.groups * GROUP as u32);
+        self.under_way.push_back(Flight { submission, kernel, units, submitted, slot, lanes });
         Ok(())
     }
 

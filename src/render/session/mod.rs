@@ -436,12 +436,8 @@ impl<'a> Session<'a> {
             let (done, rays) = match &mut self.gpu {
                 None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
-                    let rays = cpu::train(
-                        &self.state.tracer((self.world, self.environment), None),
-                        &self.state.view,
-                        paths.clone(),
-                        sums,
-                    );
+                    let tracer = self.state.tracer((self.world, self.environment), None);
+                    let rays = cpu::train(&tracer, &self.state.view, paths.clone(), sums);
                     (paths.end, rays)
                 }
                 Some(renderer) => renderer.train(paths, sums, cancel)?,
