@@ -61,10 +61,8 @@ impl Progress {
     }
 
     fn prefix(&self) -> String {
-        let frame = self.frame.as_ref();
-        frame.map_or_else(String::new, |(number, all)| {
-            format!("frame {number} up to {}: ", all.end())
-        })
+        let Some((number, all)) = &self.frame else { return String::new() };
+        format!("frame {number} up to {}: ", all.end())
     }
 
     /// Share of all frames, of which this one has so large a share behind it.

@@ -89,12 +89,9 @@ impl RenderJob {
             if path.exists() {
                 assignment.take_up(path, view)?;
             }
-            assignment.checkpoint = Some(Checkpoint {
-                path: path.clone(),
-                every: Duration::try_from_secs_f64(arguments.checkpoint_every)
-                    .unwrap_or(Duration::MAX),
-                written: Instant::now(),
-            });
+            let every = Duration::try_from_secs_f64(arguments.checkpoint_every);
+            let (path, every) = (path.clone(), every.unwrap_or(Duration::MAX));
+            assignment.checkpoint = Some(Checkpoint { path, every, written: Instant::now() });
         }
         if assignment.awaited.is_none() && assignment.first > 0 {
             let film = Film::new(view.width, view.height, view.layers);
@@ -220,12 +217,9 @@ impl RenderJob {
     ) -> Result<()> {
         let mut figures = *record.figures;
         if !record.with_times {
-            figures = Figures {
-                learning_seconds: 0.0,
-                distribution_seconds: 0.0,
-                render_seconds: 0.0,
-                ..figures
-            };
+            figures.learning_seconds = 0.0;
+            figures.distribution_seconds = 0.0;
+            figures.render_seconds = 0.0;
         }
         write_film(path, &self.facts(driver.target, figures, record.metadata()), record.film, 0)
     }
