@@ -357,28 +357,27 @@ impl Job<'_> {
 
 /// The scene made ready for rays, and the seconds of loading and of building.
 fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
-    let start = Instant::now();
     let options = arguments.of_scene.options_beside(outputs::overwritten(arguments));
-    let scene = crate::sources::scene_with(&arguments.scene, &options)?;
-    let load_seconds = lap(start);
-    let start = Instant::now();
-    let world = World::new(scene);
-    Ok((world, load_seconds, lap(start)))
+    let load = || crate::sources::scene_with(&arguments.scene, &options);
+    let (scene, load_seconds) = timed(load)?;
+    let (world, build_seconds) = timed(|| Ok(World::new(scene)))?;
+    Ok((world, load_seconds, build_seconds))
 }
 
 /// The map made ready to be sampled, what was repaired in it, and the seconds of loading and of
 /// building.
 fn load_environment(arguments: &RenderArguments) -> Result<(Environment, Notices, f64, f64)> {
-    let start = Instant::now();
-    let (map, notices) = crate::sources::map(arguments.map())?;
-    let load_seconds = lap(start);
-    let start = Instant::now();
-    let environment = Environment::new(map, &arguments.environment_options()).at(arguments.map())?;
-    Ok((environment, notices, load_seconds, lap(start)))
+    let name = arguments.map();
+    let ((map, notices), load_seconds) = timed(|| crate::sources::map(name))?;
+    let build = || Environment::new(map, &arguments.environment_options()).at(name);
+    let (environment, build_seconds) = timed(build)?;
+    Ok((environment, notices, load_seconds, build_seconds))
 }
 
-fn lap(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64()
+/// What work makes, and the seconds it took.
+fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, f64)> {
+    let start = Instant::now();
+    work().map(|made| (made, start.elapsed().as_secs_f64()))
 }
 
 /// What the standard library gives a thread for its stack.
