@@ -75,8 +75,7 @@ impl TileLocal {
         for (patches, energy) in tiles.into_iter().zip(&mut energies) {
             let row_part = row_rest.split_off_mut(..patches.len()).unwrap_or_default();
             let tile_part = tile_rest.split_off_mut(..patches.height() as usize);
-            let tile_part = tile_part.unwrap_or_default();
-            jobs.push((patches, row_part, tile_part, energy));
+            jobs.push((patches, row_part, tile_part.unwrap_or_default(), energy));
         }
         jobs.into_par_iter().for_each_init(
             || (Vec::new(), Vec::new()),

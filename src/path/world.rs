@@ -105,11 +105,9 @@ impl World {
 
     /// The same, and what lamps make of surfaces that are no nearer to them than this.
     pub(crate) fn brightest_lit(&self, environment: &Environment, nearest: f32) -> f32 {
-        let irradiance = |light: &PunctualLight| match light.kind {
-            PunctualKind::Directional => light.intensity.max_element(),
-            PunctualKind::Point | PunctualKind::Spot { .. } => {
-                light.intensity.max_element() / (nearest * nearest)
-            }
+        let irradiance = |light: &PunctualLight| {
+            let is_distant = light.kind == PunctualKind::Directional;
+            light.intensity.max_element() / if is_distant { 1.0 } else { nearest * nearest }
         };
         self.scene.lights.iter().map(irradiance).fold(self.brightest(environment), f32::max)
     }
