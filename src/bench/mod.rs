@@ -43,15 +43,13 @@ pub fn run(
         Ok(open)
     };
     let opened: Vec<_> = options.devices.iter().map(|d| open(*d)).collect::<Result<_>>()?;
-    let mut devices: Vec<_> = opened
-        .iter()
-        .map(|open| DeviceFigures {
-            name: open.name.clone(),
-            adapter: open.gpu.as_ref().map(|gpu| gpu.facts().clone()),
-            has_hardware_rays: open.gpu.as_ref().is_some_and(Gpu::has_hardware_rays),
-            scenes: Vec::new(),
-        })
-        .collect();
+    let without_scenes = |open: &OpenDevice| DeviceFigures {
+        name: open.name.clone(),
+        adapter: open.gpu.as_ref().map(|gpu| gpu.facts().clone()),
+        has_hardware_rays: open.gpu.as_ref().is_some_and(Gpu::has_hardware_rays),
+        scenes: Vec::new(),
+    };
+    let mut devices: Vec<_> = opened.iter().map(without_scenes).collect();
     let mut parity = Vec::new();
     for subject in subjects {
         let mut results = Vec::new();

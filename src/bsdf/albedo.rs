@@ -115,10 +115,8 @@ impl RowPair {
 /// the row after it.
 pub(crate) fn texels() -> Vec<[f32; 4]> {
     let entries = |row: &'static Row| row.terms.iter().chain([&row.mean]);
-    ROWS.windows(2)
-        .flat_map(|pair| entries(&pair[0]).zip(entries(&pair[1])))
-        .map(|(here, next)| [here.x, here.y, next.x, next.y])
-        .collect()
+    let pairs = ROWS.windows(2).flat_map(|rows| entries(&rows[0]).zip(entries(&rows[1])));
+    pairs.map(|(here, next)| [here.x, here.y, next.x, next.y]).collect()
 }
 
 fn row(index: usize) -> Row {
@@ -128,14 +126,13 @@ fn row(index: usize) -> Row {
     let terms = array::from_fn(|i| entry(ggx, root(i).powi(2).max(1e-5), SAMPLES));
     // The integral of 2 cos E over each piece, linear in x = sqrt(cos), so that mean and pieces agree
     // exactly: 4 x^3 (offset + slope x).
-    let mean = (0..COSINES - 1)
-        .map(|i| {
-            let (x0, x1) = (root(i), root(i + 1));
-            let slope: Vec2 = (terms[i + 1] - terms[i]) / step;
-            let offset: Vec2 = terms[i] - slope * x0;
-            offset * (x1.powi(4) - x0.powi(4)) + slope * (0.8 * (x1.powi(5) - x0.powi(5)))
-        })
-        .sum();
+    let of_piece = |i: usize| {
+        let (x0, x1) = (root(i), root(i + 1));
+        let slope: Vec2 = (terms[i + 1] - terms[i]) / step;
+        let offset: Vec2 = terms[i] - slope * x0;
+        offset * (x1.powi(4) - x0.powi(4)) + slope * (0.8 * (x1.powi(5) - x0.powi(5)))
+    };
+    let mean = (0..COSINES - 1).map(of_piece).sum();
     Row { terms, mean }
 }
 

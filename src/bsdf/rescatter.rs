@@ -228,14 +228,13 @@ fn glass_row(index: usize, roughness: f32) -> [f32; NODES + 1] {
         *entry = glass_loss(ggx, eta, (i as f32 / LAST).powi(2).max(1e-5), SAMPLES);
     }
     // The integral of 2 cos L over each piece, linear in x = sqrt(cos): 4 x^3 (offset + slope x).
-    row[NODES] = (0..NODES - 1)
-        .map(|i| {
-            let (x0, x1) = (i as f32 / LAST, (i + 1) as f32 / LAST);
-            let slope = (row[i + 1] - row[i]) * LAST;
-            let offset = row[i] - slope * x0;
-            offset * (x1.powi(4) - x0.powi(4)) + slope * (0.8 * (x1.powi(5) - x0.powi(5)))
-        })
-        .sum();
+    let of_piece = |i: usize| {
+        let (x0, x1) = (i as f32 / LAST, (i + 1) as f32 / LAST);
+        let slope = (row[i + 1] - row[i]) * LAST;
+        let offset = row[i] - slope * x0;
+        offset * (x1.powi(4) - x0.powi(4)) + slope * (0.8 * (x1.powi(5) - x0.powi(5)))
+    };
+    row[NODES] = (0..NODES - 1).map(of_piece).sum();
     row
 }
 

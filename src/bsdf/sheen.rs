@@ -196,12 +196,11 @@ impl Charlie {
             let z = x * x;
             let r = (1.0 - z * z).sqrt();
             let masking = 1.0 / ((1.0 + lambda_o + self.lambda(z)) * 4.0 * cos);
-            let around: f32 = (0..steps)
-                .map(|k| {
-                    let (sin, cos) = (PI * mid(k)).sin_cos();
-                    self.distribution((wo + Vec3::new(r * cos, r * sin, z)).normalize())
-                })
-                .sum();
+            let towards = |k: usize| {
+                let (sin, cos) = (PI * mid(k)).sin_cos();
+                self.distribution((wo + Vec3::new(r * cos, r * sin, z)).normalize())
+            };
+            let around: f32 = (0..steps).map(towards).sum();
             sum += around * masking * 2.0 * x;
         }
         sum * TAU / (steps * steps) as f32

@@ -123,17 +123,13 @@ impl Deviation {
     /// Of the whole map; rows are added in order, so that the result does not depend on threads.
     fn of(probabilities: &OfRow<'_>, weights: &Weights<'_>, total: f64) -> Self {
         let (width, height) = weights.size();
-        let rows: Vec<Self> = (0..height)
-            .into_par_iter()
-            .map_init(
-                || (vec![0.0; width as usize], Vec::new()),
-                |(row, scratch), y| {
-                    weights.row(0, y, row, scratch);
-                    let [sampled, reported] = probabilities(y);
-                    Self::of_row(row, &sampled, &reported, total)
-                },
-            )
-            .collect();
+        let buffers = || (vec![0.0; width as usize], Vec::new());
+        let of_row = |(row, scratch): &mut (Vec<f64>, Vec<f64>), y| {
+            weights.row(0, y, row, scratch);
+            let [sampled, reported] = probabilities(y);
+            Self::of_row(row, &sampled, &reported, total)
+        };
+        let rows: Vec<_> = (0..height).into_par_iter().map_init(buffers, of_row).collect();
         rows.iter().fold(Self::default(), |sum, row| Self {
             squares: sum.squares + row.squares,
             missed: sum.missed + row.missed,

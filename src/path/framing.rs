@@ -123,21 +123,18 @@ fn inside(world: &World) -> Camera {
         let (x, z) = ((place % 7) as f32 / 6.0, (place / 7) as f32 / 6.0);
         let spread = |t: f32| 0.12 + 0.76 * t;
         let eye = Vec3::new(low.x + size.x * spread(x), eye_height, low.z + size.z * spread(z));
-        let nearest = directions(64)
-            .filter_map(|d| look(world, eye, d))
-            .map(|sight| sight.distance)
-            .fold(f32::INFINITY, f32::min);
+        let sights = directions(64).filter_map(|d| look(world, eye, d));
+        let nearest = sights.map(|sight| sight.distance).fold(f32::INFINITY, f32::min);
         let mut best = (f32::MIN, eye, Vec3::NEG_Z);
         let crowded = if nearest < 0.04 * size.min_element() { 0.3 } else { 1.0 };
         for step in 0..16 {
             let angle = step as f32 * std::f32::consts::TAU / 16.0;
             let forward = Vec3::new(angle.cos(), -0.1, angle.sin()).normalize();
             // Mean free distance over the picture's width; backs and what is outdoors count nothing.
-            let score: f32 = (-4..=4)
-                .map(|i| crate::math::rotate_y(forward, i as f32 * 0.15))
-                .filter_map(|d| look(world, eye, d).filter(|sight| sight.from_front))
-                .map(|sight| sight.distance)
-                .sum();
+            let turned = (-4..=4).map(|i| crate::math::rotate_y(forward, i as f32 * 0.15));
+            let sights = turned.filter_map(|direction| look(world, eye, direction));
+            let fronts = sights.filter(|sight| sight.from_front);
+            let score: f32 = fronts.map(|sight| sight.distance).sum();
             if score * crowded > best.0 {
                 best = (score * crowded, eye, forward);
             }

@@ -193,12 +193,11 @@ fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
     // A textured emitter is probed at a few points; the factor's own share keeps it reachable where
     // all of them are dark.
     let probes = [(1.0 / 3.0, 1.0 / 3.0), (0.1, 0.1), (0.8, 0.1), (0.1, 0.8)];
-    let probed: f32 = probes
-        .iter()
-        .map(|&(b1, b2)| SurfacePoint::at(scene, triangle, Vec2::new(b1, b2), -normal))
-        .map(|point| importance(point.parameters.emissive))
-        .sum::<f32>()
-        / probes.len() as f32;
+    let probe = |&(b1, b2): &(f32, f32)| {
+        let point = SurfacePoint::at(scene, triangle, Vec2::new(b1, b2), -normal);
+        importance(point.parameters.emissive)
+    };
+    let probed = probes.iter().map(probe).sum::<f32>() / probes.len() as f32;
     let intensity = (area * (probed + 0.02 * importance(material.emissive))).min(f32::MAX);
     let place = facing(&corners, intensity);
     // What shines on both sides shines half as much in a mean direction as along its normal.

@@ -73,10 +73,9 @@ impl Bins {
 /// The bins and the last bin of the first part for the split of least cost; `None` where all lights
 /// are in one place.
 fn cheapest_cut(lights: &[Light]) -> Option<(Bins, usize)> {
-    let (low, high) = lights
-        .iter()
-        .map(|light| light.moments.center)
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let nowhere = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let centers = lights.iter().map(|light| light.moments.center);
+    let (low, high) = centers.fold(nowhere, |(l, h), c| (l.min(c), h.max(c)));
     let axes = [0, 1, 2].map(|axis| Bins {
         axis,
         low: low[axis],
