@@ -30,9 +30,8 @@ const PATHS_PER_TASK: u64 = 512;
 /// what cells there are, then doubling, as far as the counters allow in one pass.
 pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
     let total = view.learning_paths;
-    let tries = view
-        .distribution_options()
-        .map_or(1, |distributions| u64::from(distributions.tries_per_vertex.max(1)));
+    let options = view.distribution_options();
+    let tries = options.map_or(1, |options| u64::from(options.tries_per_vertex.max(1)));
     let longest = (most_paths_per_pass(view) / tries).max(1);
     let mut start = 0;
     let mut length = total.div_ceil(64).min(longest);
@@ -79,11 +78,8 @@ fn in_tasks(paths: Range<u64>, cancel: &AtomicBool, trace: impl Fn(u64) -> u32 +
         let start = paths.start + task * PATHS_PER_TASK;
         start..(start + PATHS_PER_TASK).min(paths.end)
     };
-    (0..tasks)
-        .into_par_iter()
-        .filter(|_| !cancel.load(Ordering::Relaxed))
-        .map(|task| task_of(task).map(|path| u64::from(trace(path))).sum::<u64>())
-        .sum()
+    let tasks = (0..tasks).into_par_iter().filter(|_| !cancel.load(Ordering::Relaxed));
+    tasks.map(|task| task_of(task).map(|path| u64::from(trace(path))).sum::<u64>()).sum()
 }
 
 /// Where path `path` of one long sequence over the whole picture begins; high bits count its restarts.
@@ -191,14 +187,12 @@ impl Task<'_> {
             return (0, 0);
         }
         let corner = film.corner;
-        let starts: Vec<Start<'_>> = film
-            .pixels()
-            .map(|(at, _)| {
-                let (ray, sampler, tracer) = self.start(at, sample);
-                let place = [0, 1].map(|axis| (i64::from(at[axis]) - corner[axis]) as u32);
-                Start { place, ray, sampler, tracer }
-            })
-            .collect();
+        let start = |at: [u32; 2]| {
+            let (ray, sampler, tracer) = self.start(at, sample);
+            let place = [0, 1].map(|axis| (i64::from(at[axis]) - corner[axis]) as u32);
+            Start { place, ray, sampler, tracer }
+        };
+        let starts: Vec<Start<'_>> = film.pixels().map(|(at, _)| start(at)).collect();
         let results = radiance_of_tile(tile, seed, &starts);
         let (mut samples, mut ray_count) = (0, 0);
         for ((_, mut pixel), result) in film.pixels().zip(&results) {

@@ -41,9 +41,8 @@ impl StopRule {
             true if self.noise.is_some() => (samples / 8).clamp(1, 64),
             true if !session.is_counting() => {
                 let pixels = session.view().pixels() as f64;
-                let affordable = session
-                    .seconds_per_sample()
-                    .map_or(1, |each| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32);
+                let affordable = |each: f64| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32;
+                let affordable = session.seconds_per_sample().map_or(1, affordable);
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
             }
             _ => (samples / 16).clamp(1, 64),
@@ -241,10 +240,10 @@ impl<'a> Driver<'a> {
         let figures = self.session.figures();
         match self.awaited.as_ref().and_then(|awaited| awaited.figures) {
             Some(before) => figures.learning_paths >= before.learning_paths,
-            None => self
-                .rule
-                .seconds
-                .is_some_and(|s| 2.0 * figures.learning_seconds >= LEARNING_TIME_SHARE * s),
+            None => {
+                let is_long = |s| 2.0 * figures.learning_seconds >= LEARNING_TIME_SHARE * s;
+                self.rule.seconds.is_some_and(is_long)
+            }
         }
     }
 

@@ -304,10 +304,8 @@ impl Film {
         let rows = y.saturating_sub(1)..(y + 2).min(height);
         let columns = x.saturating_sub(1)..(x + 2).min(width);
         let count = (rows.len() * columns.len()) as f64;
-        rows.flat_map(|row| &self.pixels[row * width..][columns.clone()])
-            .map(Pixel::mean_luminance)
-            .sum::<f64>()
-            / count
+        let around = rows.flat_map(|row| &self.pixels[row * width..][columns.clone()]);
+        around.map(Pixel::mean_luminance).sum::<f64>() / count
     }
 
     /// Estimated root of the trimmed relative mean squared error of the picture: the root of the mean over

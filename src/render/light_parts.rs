@@ -67,11 +67,8 @@ impl LightParts {
         let bounces = [0, 1, view.limits.bounces].map(|bounces| bounces.min(view.limits.bounces));
         let [by_all, by_lamps] = [environment, &black].map(|environment| {
             let tracer = view.tracer((world, environment), grid);
-            bounces.map(|bounces| PathTracer {
-                layers: false,
-                limits: PathLimits { bounces, ..view.limits },
-                ..tracer
-            })
+            let limits = bounces.map(|bounces| PathLimits { bounces, ..view.limits });
+            limits.map(|limits| PathTracer { layers: false, limits, ..tracer })
         });
         let of_path = |path: u32| {
             let mut camera = Sampler::new(SEED, 0, path);

@@ -115,10 +115,10 @@ fn rotation_near(world: &World, view: &View, sun: &Sun, position: Vec3) -> Optio
         let direction = sun.direction(rotation);
         let lit = spots.iter().filter(|(spot, _)| is_sunlit(world, sun, spot, rotation));
         let lit: Vec<&(Spot, f32)> = lit.collect();
-        let weights = lit
-            .iter()
-            .map(|(spot, distance)| spot.normal.dot(direction) / (1.0 + (distance / near).powi(4)));
-        Some((weights.sum::<f32>(), rotation, lit.first()?.1))
+        let weight = |&&(spot, distance): &&(Spot, f32)| {
+            spot.normal.dot(direction) / (1.0 + (distance / near).powi(4))
+        };
+        Some((lit.iter().map(weight).sum::<f32>(), rotation, lit.first()?.1))
     });
     let (_, rotation, nearest) = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some((rotation, nearest))
@@ -139,13 +139,9 @@ fn least_turn(free: &[bool]) -> Option<f64> {
         } else if run > 0 {
             let (first, last) = ((i - run) as f64, (i - 1) as f64);
             let inset = margin.min((last - first) / 2.0);
-            let turn = [0.0, 1.0]
-                .map(|turns: f64| turns * count as f64)
-                .map(|start| start.clamp(first + inset, last - inset) - start)
-                .into_iter()
-                .chain(best)
-                .min_by(|a, b| a.abs().total_cmp(&b.abs()));
-            (best, run) = (turn, 0);
+            let turn = |start: f64| start.clamp(first + inset, last - inset) - start;
+            let turns = [0.0, count as f64].map(turn).into_iter().chain(best);
+            (best, run) = (turns.min_by(|a, b| a.abs().total_cmp(&b.abs())), 0);
         }
     }
     best

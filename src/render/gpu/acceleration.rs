@@ -95,18 +95,14 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result
         ]
     });
     let parts: Vec<_> = parts.collect();
-    let sizes: Vec<_> = parts
-        .iter()
-        .map(|parts| {
-            parts.map(|(_, count, flags)| BlasTriangleGeometrySizeDescriptor {
-                vertex_format: wgpu::VertexFormat::Float32x3,
-                vertex_count: scene.positions.len() as u32,
-                index_format: Some(wgpu::IndexFormat::Uint32),
-                index_count: Some(3 * count),
-                flags,
-            })
-        })
-        .collect();
+    let size = |(_, count, flags)| BlasTriangleGeometrySizeDescriptor {
+        vertex_format: wgpu::VertexFormat::Float32x3,
+        vertex_count: scene.positions.len() as u32,
+        index_format: Some(wgpu::IndexFormat::Uint32),
+        index_count: Some(3 * count),
+        flags,
+    };
+    let sizes: Vec<_> = parts.iter().map(|parts| parts.map(size)).collect();
     let (trees, mut tlas) = gpu.make(|device| {
         let (label, max_instances) = (Some("scene"), 1 + scene.instances.len() as u32);
         let lower = wgpu::CreateBlasDescriptor { label, flags, update_mode };

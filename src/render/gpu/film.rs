@@ -173,17 +173,12 @@ fn times(sums: [f64; 4], factors: [f64; 4]) -> [f64; 4] {
 fn take_pixels(pixels: &mut [Pixel], read: &[&[u8]], factors: [f64; 4]) -> u64 {
     let (high, low) = (bytemuck::cast_slice(read[0]), bytemuck::cast_slice(read[1]));
     let counts: &[[u32; 4]] = bytemuck::cast_slice(read[2]);
-    pixels
-        .par_iter_mut()
-        .zip(high)
-        .zip(low)
-        .zip(counts)
-        .with_min_len(4096)
-        .map(|(((pixel, high), low), &[samples, invalid, rays, _])| {
-            *pixel = Pixel { sums: times(joined(*high, *low), factors), samples, invalid };
-            u64::from(rays)
-        })
-        .sum()
+    let read = pixels.par_iter_mut().zip(high).zip(low).zip(counts).with_min_len(4096);
+    let rays = read.map(|(((pixel, high), low), &[samples, invalid, rays, _])| {
+        *pixel = Pixel { sums: times(joined(*high, *low), factors), samples, invalid };
+        u64::from(rays)
+    });
+    rays.sum()
 }
 
 #[cfg(test)]

@@ -115,9 +115,8 @@ impl Flights {
             clock.resolve(&mut commands, slot);
         }
         let staging = job.report.map(|source| {
-            let all = self
-                .staging
-                .get_or_insert_with(|| std::array::from_fn(|_| gpu.staging(REPORT_BYTES)));
+            let buffers = || std::array::from_fn(|_| gpu.staging(REPORT_BYTES));
+            let all = self.staging.get_or_insert_with(buffers);
             commands.copy_buffer_to_buffer(source, 0, &all[slot], 0, REPORT_BYTES);
             &all[slot]
         });

@@ -307,9 +307,8 @@ pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32>
 
 /// Two 16-bit numbers a word.
 fn pairs(values: &[u16]) -> impl Iterator<Item = u32> {
-    values
-        .chunks(2)
-        .map(|pair| u32::from(pair[0]) | u32::from(pair.get(1).copied().unwrap_or(0)) << 16)
+    let second = |pair: &[u16]| u32::from(pair.get(1).copied().unwrap_or(0));
+    values.chunks(2).map(move |pair| u32::from(pair[0]) | second(pair) << 16)
 }
 
 /// Materials and the textures they refer to.

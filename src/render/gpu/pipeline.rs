@@ -27,37 +27,30 @@ impl Pipeline {
     /// # Errors
     /// If the driver refuses it.
     pub(super) fn new(gpu: &Gpu, entry: &str, program: Program) -> Result<Arc<Self>> {
-        let entries: Vec<_> = program
-            .bindings
-            .iter()
-            .zip(0..)
-            .map(|(binding, index)| wgpu::BindGroupLayoutEntry {
-                binding: index,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: binding_type(binding),
-                count: None,
-            })
-            .collect();
+        let entry_of = |(of, binding): (&Binding, u32)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: binding_type(of),
+            count: None,
+        };
+        let entries: Vec<_> = program.bindings.iter().zip(0..).map(entry_of).collect();
         let (layout, pipeline) = gpu.make(|device| {
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(entry),
-                entries: &entries,
-            });
-            let source = wgpu::ShaderModuleDescriptor {
-                label: Some(entry),
-                source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
-            };
+            let label = Some(entry);
+            let descriptor = wgpu::BindGroupLayoutDescriptor { label, entries: &entries };
+            let layout = device.create_bind_group_layout(&descriptor);
+            let source = wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source));
+            let source = wgpu::ShaderModuleDescriptor { label, source };
             // SAFETY: indices are checked as ever. All loops end: walks take each group of a finite tree
             // once, searches halve what is left, paths are bounded by bounces and passes, slots take
             // each pixel once, all others count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
             let module = unsafe { device.create_shader_module_trusted(source, RUNTIME_CHECKS) };
             let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(entry),
+                label,
                 bind_group_layouts: &[Some(&layout)],
                 immediate_size: 0,
             });
             let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
+                label,
                 layout: Some(&pipeline_layout),
                 module: &module,
                 entry_point: Some(entry),

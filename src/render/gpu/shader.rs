@@ -341,10 +341,9 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
         ("cast_rays", "array<CastRay>", false, kernel.casts()),
         ("cast_results", "array<vec2u>", true, kernel.casts()),
     ];
-    let buffers = buffers
-        .into_iter()
-        .filter(|(.., is_needed)| *is_needed)
-        .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
+    let buffers = buffers.into_iter().filter(|(.., is_needed)| *is_needed);
+    let buffers =
+        buffers.map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
     let arrays = ARRAYS.into_iter().filter(|array| (array.is_needed)(&features)).map(|array| {
         if places.in_buffers.contains(array.name) {
             let (store, _) = array.in_buffer();
