@@ -152,11 +152,9 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
 fn try_ffmpeg(codec: &str) -> std::result::Result<(), String> {
     const SIDE: usize = 64;
     let cannot = |cause: &dyn std::fmt::Display| format!("ffmpeg cannot make it: {cause}");
+    let input = format!("-v error -f rawvideo -pix_fmt rgb24 -s {SIDE}x{SIDE} -i -");
     let child = Command::new("ffmpeg")
-        .args(["-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
-        .args(["-s", &format!("{SIDE}x{SIDE}"), "-i", "-"])
-        .args(codec.split_whitespace())
-        .args(["-f", "null", "-"])
+        .args(format!("{input} {codec} -f null -").split_whitespace())
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
