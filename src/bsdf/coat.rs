@@ -37,13 +37,9 @@ impl Coat {
         if p.clearcoat == 0.0 {
             return Self::ABSENT;
         }
-        Self {
-            strength: p.clearcoat,
-            ggx: Ggx::from_roughness(p.clearcoat_roughness),
-            frame: Frame::from_z(p.clearcoat_normal),
-            thin: p.thin,
-            entering,
-        }
+        let ggx = Ggx::from_roughness(p.clearcoat_roughness);
+        let frame = Frame::from_z(p.clearcoat_normal);
+        Self { strength: p.clearcoat, ggx, frame, thin: p.thin, entering }
     }
 
     pub(super) fn is_absent(&self) -> bool {

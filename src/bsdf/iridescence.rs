@@ -28,11 +28,8 @@ impl Film {
     pub(crate) fn new(p: &SurfaceParameters) -> Self {
         // A film much thinner than light's waves is not there.
         let t = (p.iridescence_thickness / 0.03).clamp(0.0, 1.0);
-        Self {
-            share: p.iridescence,
-            ior: 1.0 + (p.iridescence_ior.max(1.0) - 1.0) * (t * t * (3.0 - 2.0 * t)),
-            thickness: 1e-3 * p.iridescence_thickness,
-        }
+        let ior = 1.0 + (p.iridescence_ior.max(1.0) - 1.0) * (t * t * (3.0 - 2.0 * t));
+        Self { share: p.iridescence, ior, thickness: 1e-3 * p.iridescence_thickness }
     }
 
     pub(super) fn is_absent(&self) -> bool {

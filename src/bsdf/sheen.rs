@@ -69,14 +69,9 @@ impl Sheen {
         if p.sheen_color == Vec3::ZERO {
             return Self::ABSENT;
         }
-        Self {
-            color: p.sheen_color,
-            strength: p.sheen_color.max_element(),
-            lobe: Charlie::new(p.sheen_roughness),
-            thin: p.thin,
-            entering,
-            roughness: p.sheen_roughness,
-        }
+        let (color, roughness) = (p.sheen_color, p.sheen_roughness);
+        let (strength, lobe) = (color.max_element(), Charlie::new(roughness));
+        Self { color, strength, lobe, thin: p.thin, entering, roughness }
     }
 
     pub(super) fn is_absent(&self) -> bool {

@@ -141,12 +141,9 @@ impl TileLocal {
     pub(crate) fn finish(&self, search: &Search) -> PatchSample {
         let sums = &self.row_sums[search.sums..][..search.length as usize];
         let column = search.target.find(sums, search.before);
-        PatchSample {
-            x: search.column + column.index as u32,
-            y: search.row,
-            within: Vec2::new(column.fraction, search.down),
-            probability: column.mass as f32 / search.total as f32,
-        }
+        let within = Vec2::new(column.fraction, search.down);
+        let probability = column.mass as f32 / search.total as f32;
+        PatchSample { x: search.column + column.index as u32, y: search.row, within, probability }
     }
 
     /// Probability of [`Self::finish`] to choose this patch of the tile.
@@ -209,13 +206,10 @@ fn places(tile_sums: &[u32], grid: &TileGrid) -> Vec<Place> {
         // Each tile of a row of them has as many rows as the others.
         let before = patches.y.start as usize * columns as usize;
         let first_row = before + (tile % columns) as usize * height as usize;
-        Place {
-            corner: [patches.x.start, patches.y.start],
-            size: [width, height],
-            first_row,
-            first_patch: grid.first_patch(patches),
-            total: tile_sums[first_row + height as usize - 1],
-        }
+        let (corner, size) = ([patches.x.start, patches.y.start], [width, height]);
+        let first_patch = grid.first_patch(patches);
+        let total = tile_sums[first_row + height as usize - 1];
+        Place { corner, size, first_row, first_patch, total }
     };
     (0..grid.count()).map(place).collect()
 }
