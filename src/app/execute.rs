@@ -30,7 +30,7 @@ use crate::render::surface_map::look_at_place;
 use crate::render::{Sampling, StopRule};
 use crate::scene::{LampEdits, builtin};
 use crate::sources;
-use crate::tone::{Lut, display_rgb8};
+use crate::tone::display_rgb8;
 
 /// Why there is nothing to render.
 const NOT_YET: &str = "The scene is still being read";
@@ -63,7 +63,7 @@ impl App {
             Command::ToggleReloads => self.library.settings.reloads ^= true,
             Command::Ask(purpose) => self.ask(purpose),
             Command::OpenLook(name) => {
-                let name = if Lut::is_built_in(&name) { name } else { lasting_map(&name) };
+                let name = lasting_map(&name);
                 self.assets.looks.forget(&name);
                 document.look.lut = Some(name);
             }
@@ -79,18 +79,22 @@ impl App {
             Command::ShowMethod => self.messages.failure(desktop::show_method()),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
-            Command::Render(path) => match self.shown_words(&path) {
-                Some(words) => {
-                    self.library.note_save(&path);
-                    self.renders.add(path, words, None);
-                    self.is_warned = false;
+            Command::Render(path) => {
+                let (render, document) = (self.interface.final_render, &self.edited.document);
+                match self.render_words(render, document, &path) {
+                    Some(words) => {
+                        self.library.note_save(&path);
+                        self.renders.add(path, words, None);
+                        self.is_warned = false;
+                    }
+                    None => self.messages.notice(NOT_YET),
                 }
-                None => self.messages.notice(NOT_YET),
-            },
+            }
             Command::EndRender(index) => self.renders.end(index),
             Command::CopyCommandLine => {
                 let path = self.suggested_render();
-                let words = self.shown_words(Path::new(&path));
+                let (render, document) = (self.interface.final_render, &self.edited.document);
+                let words = self.render_words(render, document, Path::new(&path));
                 let copied = words.map(|words| context.copy_text(command_line(&words)));
                 self.messages.notice(copied.map_or(NOT_YET, |()| "Copied the command"));
             }
@@ -415,7 +419,7 @@ impl App {
         });
         let words = size.and_then(|size| {
             let render = FinalRender { size, ..FinalRender::default() };
-            self.render_words(&render, &document, &path)
+            self.render_words(render, &document, &path)
         });
         match words {
             Some(words) => self.renders.add(path, words, Some(of)),
@@ -423,15 +427,10 @@ impl App {
         }
     }
 
-    /// Arguments of this program that render what is shown into a file.
-    fn shown_words(&self, path: &Path) -> Option<Vec<String>> {
-        self.render_words(&self.interface.final_render, &self.edited.document, path)
-    }
-
     /// Arguments of this program that render a document of the scene that is shown.
     fn render_words(
         &self,
-        render: &FinalRender,
+        render: FinalRender,
         document: &Document,
         path: &Path,
     ) -> Option<Vec<String>> {

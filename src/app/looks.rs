@@ -30,14 +30,11 @@ pub(super) struct Looks {
 impl Looks {
     /// Reads the look that is asked for, unless that was done.
     pub(super) fn read(&mut self, look: &Look) -> Option<impl FnOnce() -> ReadLook + use<>> {
-        let name = match &look.lut {
-            Some(name) if !self.read.contains_key(name) => name.clone(),
-            Some(name) if self.read[name].is_none() => return None,
-            asked => {
-                self.last.clone_from(asked);
-                return None;
-            }
-        };
+        let is_there = |name: &String| self.read.get(name).is_some_and(Option::is_some);
+        if look.lut.as_ref().is_none_or(is_there) {
+            self.last.clone_from(&look.lut);
+        }
+        let name = look.lut.clone().filter(|name| !self.read.contains_key(name))?;
         self.read.insert(name.clone(), None);
         Some(move || {
             let is_file = !Lut::is_built_in(&name);

@@ -15,7 +15,7 @@ use super::screen::{Screen, TextureCopies, renderer_options};
 use super::theme;
 use super::threads::{Wake, Wakes};
 use crate::error::{Error, Result};
-use crate::image::Rgb8;
+use crate::image::{Image, Rgb8};
 use crate::render::gpu::{DeviceChoice, Gpu, texture};
 
 /// Frames drawn after everything is settled: layout and tooltips need a few.
@@ -91,6 +91,24 @@ impl Studio {
         self.settle()?;
         self.app.execute(super::commands::Command::MeasureTruth, &self.context);
         Ok(())
+    }
+
+    /// Renders a reference of what is shown, and waits for it; its linear radiance.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or the reference is not rendered.
+    pub fn render_reference(&mut self) -> Result<Image> {
+        self.settle()?;
+        self.app.execute(super::commands::Command::RenderReference, &self.context);
+        loop {
+            self.frame()?;
+            if let Some(reference) = &self.app.assets.reference {
+                return Ok(reference.image.clone());
+            }
+            if let Some(error) = self.app.messages.first_error() {
+                return Err(Error::new(error));
+            }
+        }
     }
 
     /// Chooses the first material of this name, as a click on one of its surfaces would.

@@ -149,8 +149,8 @@ impl Lut {
                 Vec3::from([0, 1, 2].map(|c| channel(place[c], c)))
             }));
         }
-        let entries = rows.iter().map(|row| row.clamp(Vec3::ZERO, Vec3::ONE).extend(0.0));
-        let entries = entries.map(|entry| entry.to_array()).collect();
+        let entry = |row: &Vec3| row.clamp(Vec3::ZERO, Vec3::ONE).extend(0.0).to_array();
+        let entries = rows.iter().map(entry).collect();
         let lut = Self(Arc::new(Table { name: name.to_owned(), side, entries }));
         if (low, high) == (Vec3::ZERO, Vec3::ONE) {
             return Ok(lut);

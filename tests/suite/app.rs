@@ -195,6 +195,28 @@ fn the_inspector_shows_distribution_and_truth() {
     compare("panel-inspect-truth", &picture).expect("as it was");
 }
 
+/// The reference that a window renders shows the same as a render on the command line with other random numbers.
+#[test]
+fn a_reference_is_rendered_beside_the_window() {
+    let mut start = start();
+    start.program = env!("CARGO_BIN_EXE_lightgrid").into();
+    start.document.scene = "open".to_owned();
+    start.document.size = PictureSize::Fixed(48, 32);
+    let Some(mut studio) = studio(start, (800, 500)) else { return };
+    let reference = studio.render_reference().expect("rendered");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("a.exr");
+    let line = "render open --env sky:day@256x128 --size 48x32 --spp 256 --device cpu -o";
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+    let status = command.args(line.split_whitespace()).arg(&file).status().expect("started");
+    assert!(status.success());
+    let rendered = read_picture(&file).expect("written");
+    assert_eq!((reference.width, reference.height), (48, 32));
+    assert!(reference != rendered, "random numbers differ");
+    let error = lightgrid::metrics::relative_rms_error(&rendered, &reference).expect("same size");
+    assert!(error < 0.1, "{error}");
+}
+
 /// A driver that resets takes the device with it; the window goes on with another, and nothing of
 /// the picture is lost.
 #[test]

@@ -6,7 +6,7 @@ use super::button::button;
 use super::scope::Scope;
 use super::{color_bar, map_view, overlay, pixel_light};
 use crate::app::commands::Command;
-use crate::app::inspect::{Inspected, Inspector, Truth};
+use crate::app::inspect::{Inspected, Inspector};
 use crate::app::interface::{Interface, Purpose, TileView};
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
@@ -212,9 +212,9 @@ fn measure(
     let is_busy = inspector.busy;
     ui.horizontal_wrapped(|ui| {
         let label = if is_busy { "Measuring…" } else { "Measure the truth" };
-        let button = ui.add_enabled(!is_busy, egui::Button::new(label));
+        let response = ui.add_enabled(!is_busy, egui::Button::new(label));
         let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
-        if button.on_hover_text(hint).clicked() {
+        if response.on_hover_text(hint).clicked() {
             interface.pinned = interface.inspected();
             commands.push(Command::MeasureTruth);
         }

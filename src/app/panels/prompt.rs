@@ -10,7 +10,6 @@ use crate::app::interface::{Interface, Purpose, Refusal};
 use crate::app::theme;
 use crate::image::extension;
 use crate::sources;
-use crate::tone::Lut;
 
 /// Why a path is not taken, unless it is; `typed` is the path as it was typed.
 fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
@@ -23,7 +22,6 @@ fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
     let is_built_in = match purpose {
         Purpose::Scene => sources::is_built_in_scene(typed),
         Purpose::Map => sources::is_built_in_map(typed),
-        Purpose::Look => Lut::is_built_in(typed),
         _ => false,
     };
     match path {
