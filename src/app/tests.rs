@@ -461,6 +461,9 @@ fn a_look_is_read_when_it_is_named_and_taken_back_if_it_cannot_be() {
     studio.settle().expect("rendered");
     let levels = |studio: &mut Studio| {
         studio.settle().expect("rendered");
+        while studio.app.assets.looks.last != studio.app.edited.document.look.lut {
+            studio.frame().expect("drawn");
+        }
         studio.frame().expect("drawn");
         studio.app.display.read().expect("a picture").expect("read").pixels
     };
