@@ -16,7 +16,7 @@ pub enum Command {
     OpenScene(String),
     /// Light with another map: a file or a built-in sky.
     OpenMap(String),
-    /// Lay a look over the picture: a `.cube` file.
+    /// Lay the look of a `.cube` file over the picture.
     OpenLook(String),
     /// Read the files of scene and map again: another program may have written them.
     ReadAgain,

@@ -91,7 +91,7 @@ with_defaults! {
         pub exposure_ev: f32 = 0.0,
         /// Tone curve.
         pub curve: ToneCurve = ToneCurve::Agx,
-        /// What is laid over that: a `.cube` file or a built-in look.
+        /// Look over the tone curve: a `.cube` file or a built-in look.
         pub lut: Option<String> = None,
         /// Its share, `[0,1]`.
         pub lut_strength: f32 = 1.0,

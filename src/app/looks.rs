@@ -21,7 +21,7 @@ pub(super) struct ReadLook {
 pub(super) struct Looks {
     /// `None` while one is read.
     read: BTreeMap<String, Option<Lut>>,
-    /// What was asked for last that is there.
+    /// Name of the look in use: the last one that was read.
     pub(super) last: Option<String>,
     /// Files in the folder of the one that was read last.
     pub(super) listed: Vec<String>,

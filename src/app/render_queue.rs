@@ -36,7 +36,7 @@ pub(super) struct Job {
     thread: Option<JoinHandle<()>>,
     /// Whether it is to end before it is done.
     is_cut_short: bool,
-    /// What it shows, if errors are to be measured against it and its file is for that alone.
+    /// Document that a reference shows; `None` for a file that a person asked for.
     pub(super) reference_of: Option<Box<Document>>,
 }
 
@@ -111,7 +111,7 @@ impl RenderQueue {
         Self { program, jobs: Vec::new(), wake }
     }
 
-    /// Adds a file that the program with these arguments writes, and of what it is a reference, if it is one.
+    /// Adds a file that the program with these arguments writes; a reference comes with the document that it shows.
     pub(super) fn add(
         &mut self,
         path: PathBuf,
@@ -142,7 +142,7 @@ impl RenderQueue {
         Some(Err(failure))
     }
 
-    /// A reference that is there, and what it shows; it leaves the list.
+    /// Takes a rendered reference from the list: its file, and the document that it shows.
     pub(super) fn take_reference(&mut self) -> Option<(PathBuf, Box<Document>)> {
         let is_there =
             |job: &Job| job.reference_of.is_some() && job.state() == State::Ended(Ok(()));
@@ -151,7 +151,7 @@ impl RenderQueue {
         Some((job.path, job.reference_of?))
     }
 
-    /// Files that are not yet there and that a person waits for.
+    /// Unfinished files that a person asked for.
     pub(super) fn unfinished(&self) -> usize {
         let is_unfinished =
             |job: &&Job| job.reference_of.is_none() && !matches!(job.state(), State::Ended(_));
@@ -179,7 +179,7 @@ impl RenderQueue {
             let path = job.path.display();
             failures.extend(match job.state() {
                 _ if job.reference_of.is_some() => {
-                    // It may not have been written.
+                    // The process may have ended before it wrote.
                     let _ = std::fs::remove_file(&job.path);
                     None
                 }

@@ -27,7 +27,7 @@ pub(super) struct Picture {
     pub(super) scene: LoadedScene,
     /// The map.
     pub(super) map: LoadedMap,
-    /// How it is developed.
+    /// Tone curve and look.
     pub(super) tone: Tone,
 }
 

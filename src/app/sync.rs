@@ -68,7 +68,7 @@ impl App {
         if let Some((path, of)) = self.renders.take_reference() {
             self.tasks.run("reference", move || {
                 let image = read_picture(&path);
-                // What is left of it lies among other files that nobody needs.
+                // A temporary file that stays does no harm.
                 let _ = std::fs::remove_file(&path);
                 let name = "a render of its own".to_owned();
                 Ok(TaskResult::Reference(Arc::new(Reference { name, image: image? }), Some(of)))

@@ -29,7 +29,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         theme::note(ui, "Earlier runs are dim");
         let hint = "A picture of this view without noise; the true error is plotted, too";
         button(ui, ("Reference…", hint), commands, Command::Ask(Purpose::Reference));
-        match renders.jobs.iter().find(|job| job.reference_of.is_some()).map(Job::state) {
+        match renders.jobs.iter().rfind(|job| job.reference_of.is_some()).map(Job::state) {
             Some(State::Running { share, .. }) => {
                 theme::note(ui, format!("Reference: {:.0} %", 100.0 * share));
             }

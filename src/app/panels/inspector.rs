@@ -81,7 +81,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
                 let elsewhere = theme::percent(misplaced(&kept.probabilities, inspected));
                 theme::note(
                     ui,
-                    format!("{elsewhere} of the probability above lies elsewhere here"),
+                    format!("Total variation from the cell under the pointer: {elsewhere}"),
                 );
             }
         }
@@ -173,13 +173,11 @@ fn tiles(
         let densities = within.and_then(|Vec2 { x, y }| of?.densities(tile, glam::Vec2::new(x, y)));
         let densities = densities.map_or(String::new(), |[light, bounce]| {
             let weight = theme::percent(light / (light + bounce).max(f32::MIN_POSITIVE));
-            format!(
-                "\npdf {} / sr, MIS weight {weight} beside a diffuse bounce",
-                theme::figure(f64::from(light))
-            )
+            let light = theme::figure(f64::from(light));
+            format!("\npdf {light} / sr, MIS weight {weight} beside a diffuse bounce")
         });
-        let place = format!("Tile {tile}: row {row}, column {column}");
-        response.on_hover_text(format!("{place}\n{share}{densities}"));
+        let text = format!("Tile {tile}: row {row}, column {column}\n{share}{densities}");
+        response.on_hover_text(text);
     }
 }
 
@@ -209,10 +207,9 @@ fn measure(
     inspector: &Inspector,
     commands: &mut Vec<Command>,
 ) {
-    let is_busy = inspector.busy;
     ui.horizontal_wrapped(|ui| {
-        let label = if is_busy { "Measuring…" } else { "Measure the truth" };
-        let response = ui.add_enabled(!is_busy, egui::Button::new(label));
+        let label = if inspector.busy { "Measuring…" } else { "Measure the truth" };
+        let response = ui.add_enabled(!inspector.busy, egui::Button::new(label));
         let hint = "Shadow rays to every tile, 256 each, and 4096 paths: what arrives here, by which ways, and why it is dark or noisy";
         if response.on_hover_text(hint).clicked() {
             interface.pinned = interface.inspected();
