@@ -1,5 +1,5 @@
-// From sums of radiance to a picture for a display. Twin of `src/tone.rs` and
-// what is in `src/tone`; the CPU's results and these differ by one 8-bit level at most.
+// From sums of radiance to a picture for a display. Twin of `src/tone.rs`, `src/tone/lut.rs` and
+// `src/tone/white_balance.rs`; the CPU's results and these differ by one 8-bit level at most.
 
 struct Develop {
     // White balance, linear Rec.709 to the same.

@@ -16,7 +16,7 @@ use super::kept_picture::SMALL_WIDTH;
 use super::loader::Kind;
 use super::overlays::Overlay;
 use super::screen::color_image;
-use super::settings_file::{lasting_map, lasting_scene};
+use super::settings_file::{lasting, lasting_scene};
 use super::sync::stay_in_scene;
 use super::tasks::TaskResult;
 use super::worker::{Activity, Reference, Snapshot};
@@ -63,7 +63,7 @@ impl App {
             Command::ToggleReloads => self.library.settings.reloads ^= true,
             Command::Ask(purpose) => self.ask(purpose),
             Command::OpenLook(name) => {
-                let name = lasting_map(&name);
+                let name = lasting(&name);
                 self.assets.looks.forget(&name);
                 document.look.lut = Some(name);
             }
@@ -413,11 +413,8 @@ impl App {
         document.light.sampling = Sampling::Adaptive;
         let name = format!("lightgrid-{}-reference.exr", std::process::id());
         let path = std::env::temp_dir().join(name);
-        let size = self.rendering.snapshot.as_ref().map(|snapshot| {
-            let view = &snapshot.request.view;
-            view.crop.map_or([view.width, view.height], |crop| crop.whole)
-        });
-        let words = size.and_then(|size| {
+        let words = self.rendering.snapshot.as_ref().and_then(|snapshot| {
+            let size = snapshot.request.view.whole_size();
             let render = FinalRender { size, ..FinalRender::default() };
             self.render_words(render, &document, &path)
         });

@@ -253,7 +253,7 @@ impl Settings {
 }
 
 /// A path that means the same in another folder.
-fn lasting(path: &str) -> String {
+pub(super) fn lasting(path: &str) -> String {
     let absolute = || std::path::absolute(path).ok()?.to_str().map(str::to_owned);
     absolute().unwrap_or_else(|| path.to_owned())
 }

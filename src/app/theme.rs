@@ -21,6 +21,12 @@ pub(super) const PANEL: Color32 = Color32::from_rgb(33, 34, 38);
 pub(super) const FIELD: Color32 = Color32::from_rgb(48, 50, 56);
 /// Text that matters.
 pub(super) const TEXT: Color32 = Color32::from_rgb(224, 226, 230);
+/// A name with a capital first letter.
+pub(super) fn capitalised(name: &str) -> String {
+    let first = name.chars().take(1).flat_map(char::to_uppercase);
+    first.chain(name.chars().skip(1)).collect()
+}
+
 /// Text that explains.
 pub(super) const QUIET: Color32 = Color32::from_rgb(152, 156, 164);
 /// What is chosen or in progress.

@@ -78,8 +78,10 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let mut devices = arguments.device.clone();
     let adapters = adapters();
     if devices.is_empty() {
-        let has_gpu = arguments.adapter.is_some() || !adapters.is_empty();
-        devices = [Device::Cpu].into_iter().chain(has_gpu.then_some(Device::Gpu)).collect();
+        devices.push(Device::Cpu);
+        if arguments.adapter.is_some() || !adapters.is_empty() {
+            devices.push(Device::Gpu);
+        }
     }
     let has_real_gpu = devices.contains(&Device::Gpu)
         && adapters.iter().any(|adapter| {

@@ -101,7 +101,7 @@ impl Pixel {
 }
 
 impl Surface {
-    /// Mean albedo, unit normal and distance in metres, of so many samples of the pixel.
+    /// Mean albedo, unit normal and distance in metres of a pixel with this number of samples.
     fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
         let albedo = self.albedo / f64::from(samples.max(1));
         let normal = self.normal.normalize_or_zero();

@@ -72,11 +72,11 @@ const MAX_METHODS: usize = 40;
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 11975),
+    ("app", 11973),
     ("bench", 443),
     ("bsdf", 1449),
     ("bvh", 1346),
-    ("cli", 3497),
+    ("cli", 3499),
     ("color", 27),
     ("denoise", 1212),
     ("develop", 430),

@@ -15,6 +15,7 @@ use crate::app::theme;
 use crate::app::worker::Snapshot;
 use crate::environment::sun::Sun;
 use crate::light_grid::counters::Tally;
+use crate::math::balance_heuristic;
 
 /// Axes that surfaces face.
 const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
@@ -172,7 +173,7 @@ fn tiles(
         let within = response.hover_pos().map(|at| (at - rect.min) / rect.size());
         let densities = within.and_then(|Vec2 { x, y }| of?.densities(tile, glam::Vec2::new(x, y)));
         let densities = densities.map_or(String::new(), |[light, bounce]| {
-            let weight = theme::percent(light / (light + bounce).max(f32::MIN_POSITIVE));
+            let weight = theme::percent(balance_heuristic(light, bounce));
             let light = theme::figure(f64::from(light));
             format!("\npdf {light} / sr, MIS weight {weight} beside a diffuse bounce")
         });

@@ -45,6 +45,5 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
 }
 
 fn capital(sampling: Sampling) -> String {
-    let name = name_of(sampling);
-    format!("{}{}", name[..1].to_uppercase(), &name[1..])
+    theme::capitalised(&name_of(sampling))
 }

@@ -106,10 +106,7 @@ fn curve_name(curve: ToneCurve) -> &'static str {
 /// Chooses a look; `listed` are those beside the one that was opened last.
 fn look(ui: &mut Ui, look: &mut Look, listed: &[String], commands: &mut Vec<Command>) {
     let title = |name: &str| match name.strip_prefix("look:") {
-        Some(name) => {
-            let first = name.chars().take(1).flat_map(char::to_uppercase);
-            first.chain(name.chars().skip(1)).collect::<String>().replace('-', " ")
-        }
+        Some(name) => theme::capitalised(name).replace('-', " "),
         None => theme::file_name(name),
     };
     theme::row(ui, "Look", "Colours laid over the picture", |ui| {
