@@ -2,12 +2,14 @@
 
 use std::io::Read as _;
 use std::path::Path;
+use std::slice;
 
 use crate::environment::sky;
 use crate::error::{At as _, Error, Notices, Result};
 use crate::image::Image;
 use crate::image::{extension, looks_like_picture, looks_like_scene, open_file, read_map};
 use crate::memory;
+use crate::scene::needs::is_emitter;
 use crate::scene::{
     LampEdit, Material, MaterialEdit, PunctualLight, Scene, SceneOptions, builtin, gltf,
 };
@@ -45,8 +47,14 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     change(&mut scene.materials, &options.edits, is_called, MaterialEdit::apply)
         .map_err(|missing| Error::at(name, scene.without_material(missing)))?;
     let is_called = |light: &PunctualLight, name: &str| light.name == name;
-    change(&mut scene.lights, &options.lamp_edits, is_called, LampEdit::apply)
-        .map_err(|missing| Error::at(name, scene.without_lamp(missing)))?;
+    for edit in &options.lamp_edits {
+        let emitters = scene.materials.iter_mut().filter(|it| is_emitter(it) && it.name == edit.0);
+        let count = emitters.map(|material| *material = edit.1.apply_to_material(material)).count();
+        let lights = change(&mut scene.lights, slice::from_ref(edit), is_called, LampEdit::apply);
+        if let (0, Err(missing)) = (count, lights) {
+            return Err(Error::at(name, scene.without_lamp(missing)));
+        }
+    }
     if options.edits.iter().any(|(_, edit)| edit.hidden) {
         scene.check_shown().at(name)?;
     }

@@ -425,14 +425,15 @@ impl App {
     }
 
     /// Arguments of this program that render a document of the scene that is shown.
-    fn render_words(
+    pub(super) fn render_words(
         &self,
         render: FinalRender,
         document: &Document,
         path: &Path,
     ) -> Option<Vec<String>> {
-        let scene = &self.assets.scene_of(document)?.world.scene;
-        let of_scene = &self.library.history.of_scene;
+        let loaded = self.assets.scene_of(document)?;
+        let (scene, of_scene) = (&loaded.world.scene, &self.library.history.of_scene);
+        let of_scene = (of_scene, &loaded.named_lamps[..]);
         let look = &document.look;
         let own_ev = (!look.auto_exposure).then_some(look.exposure_ev);
         let exposure_ev = self.display.exposure_ev(document).or(own_ev);

@@ -1,6 +1,5 @@
 //! What is to be rendered into a file beside the window, as words of the command line.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
@@ -11,7 +10,7 @@ use crate::image::extension;
 use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
 use crate::scene::camera_path::FRAMES_PER_SECOND;
-use crate::scene::{Camera, LampEdit, Lamps, Outlines, Scene, SceneOptions};
+use crate::scene::{Camera, LampEdit, Lamps, NamedLamp, Outlines, Scene, SceneOptions};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 use crate::tone::{Lut, ToneCurve, WhiteBalance};
 
@@ -48,7 +47,7 @@ impl FinalRender {
         &self,
         document: &Document,
         scene: &Scene,
-        of_scene: &SceneOptions,
+        (of_scene, lamps): (&SceneOptions, &[NamedLamp]),
         exposure_ev: Option<f32>,
         output: &Path,
     ) -> Vec<String> {
@@ -112,7 +111,7 @@ impl FinalRender {
             words.extend(value.map(|value| format!("--{name}={value}")));
         };
         options.into_iter().for_each(|(name, value)| add(name, value));
-        of_file(document, scene, of_scene, &mut add);
+        of_file(document, scene, (of_scene, lamps), &mut add);
         of_fog(document, scene, &mut add);
         if let Some(viewpoint) = &document.viewpoint {
             self.of_camera(viewpoint, scene, &mut add);
@@ -212,7 +211,7 @@ fn of_background(background: Background) -> Option<String> {
 fn of_file(
     document: &Document,
     scene: &Scene,
-    of_scene: &SceneOptions,
+    (of_scene, lamps_by_name): (&SceneOptions, &[NamedLamp]),
     add: &mut impl FnMut(&str, Option<String>),
 ) {
     let SceneOptions { variant, outlines, lamps, hide, edits, .. } = of_scene;
@@ -233,8 +232,7 @@ fn of_file(
         let name = if of_name.count() == 1 { name } else { number.to_string() };
         add("material", Some(edit.to_text(&name)));
     }
-    let mut names = HashSet::new();
-    for lamp in scene.lights.iter().filter(|lamp| names.insert(&lamp.name)) {
+    for lamp in lamps_by_name {
         let edit = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
         let all = LampEdit { factor: document.lamps, ..LampEdit::default() };
         let edit = edit.then(&all);

@@ -1,6 +1,5 @@
 //! Reads scenes and maps beside the window: a large file never holds it up.
 
-use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
@@ -14,7 +13,8 @@ use crate::image::{Image, catch_panic};
 use crate::memory;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Material, PunctualLight, SceneOptions};
+use crate::scene::needs::is_emitter;
+use crate::scene::{LampEdit, Material, NamedLamp, PunctualLight, SceneOptions, named_lamps};
 use crate::sources;
 
 /// A scene ready for rays.
@@ -30,8 +30,8 @@ pub struct LoadedScene {
     pub materials: Arc<[Material]>,
     /// Its point, spot and directional lights without them.
     lights: Arc<[PunctualLight]>,
-    /// One of these for each name: the first.
-    pub named_lamps: Arc<[PunctualLight]>,
+    /// These, and materials that emit without or with changes.
+    pub named_lamps: Arc<[NamedLamp]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
@@ -58,16 +58,22 @@ impl LoadedScene {
                 *material = edit.apply(material);
             }
         }
-        let changed = |light: &PunctualLight| {
-            let edit = changes.lamp_edits.get(&light.name).copied().unwrap_or_default();
-            let light = edit.apply(light);
-            PunctualLight { intensity: light.intensity * changes.lamps, ..light }
+        let all = [&self.materials[..], &materials].concat();
+        let named_lamps = named_lamps(&self.lights, &all).into();
+        let edit = |name: &String| {
+            let own = changes.lamp_edits.get(name).copied().unwrap_or_default();
+            own.then(&LampEdit { factor: changes.lamps, ..LampEdit::default() })
         };
+        for material in materials.iter_mut().filter(|material| is_emitter(material)) {
+            *material = edit(&material.name).apply_to_material(material);
+        }
+        let changed = |light: &PunctualLight| edit(&light.name).apply(light);
         let world = self.world.with_looks(materials, self.lights.iter().map(changed).collect());
         let world =
             world.map_err(|cause| Error::at(&self.name, format!("to change it {cause}")))?;
         let world = Arc::new(world);
-        Ok(Self { kernel: KernelFacts::of_scene(&world), world, changes, ..self })
+        let kernel = KernelFacts::of_scene(&world);
+        Ok(Self { kernel, world, changes, named_lamps, ..self })
     }
 }
 
@@ -317,10 +323,9 @@ fn load_scene(name: &str, options: &SceneOptions, steps: &Steps) -> Result<Loade
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let kernel = KernelFacts::of_scene(&world);
-    let materials = world.scene.materials.clone().into();
+    let materials: Arc<[Material]> = world.scene.materials.clone().into();
     let lights: Arc<[PunctualLight]> = world.scene.lights.clone().into();
-    let mut names = HashSet::new();
-    let named_lamps = lights.iter().filter(|light| names.insert(&light.name)).cloned().collect();
+    let named_lamps = named_lamps(&lights, &materials).into();
     let (name, changes) = (name.to_owned(), Document::default().changes());
     Ok(LoadedScene { name, world, changes, materials, lights, named_lamps, kernel, seconds })
 }

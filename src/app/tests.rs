@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use egui::Id;
 use egui::containers::PanelState;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 use super::application::Start;
 use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
 use super::edited;
+use super::final_render::FinalRender;
 use super::interface::{Dock, Interface, Tab};
 use super::loader::{Loaded, Loader};
 use super::overlays::{Legend, Overlay};
@@ -92,7 +93,7 @@ fn all_of_a_room_is_framed_from_inside_and_of_an_object_from_outside() {
         let Some(mut studio) = studio(scene) else { return };
         studio.settle().expect("rendered");
         let document = &mut studio.app.edited.document;
-        document.viewpoint.as_mut().expect("a camera").fly(glam::Vec3::new(0.0, 0.0, -1.0));
+        document.viewpoint.as_mut().expect("a camera").fly(Vec3::new(0.0, 0.0, -1.0));
         studio.asks(Command::FrameAll);
         let eye = studio.app.edited.document.viewpoint.as_ref().expect("framed").eye();
         let (low, high) = studio.app.assets.scene.as_ref().expect("read").world.bvh.bounds();
@@ -401,6 +402,34 @@ fn lamps_are_scaled_apart_from_the_map() {
     assert_eq!(candela(&mut studio, 2.0), 16.0);
 }
 
+/// A material that emits is a lamp of its name: what a change to it does, changes of the material do as well.
+#[test]
+fn materials_that_emit_are_lamps() {
+    let Some(mut studio) = studio("evening") else { return };
+    studio.settle().expect("rendered");
+    let loaded = studio.app.assets.scene.as_ref().expect("it is there");
+    let names: Vec<&str> = loaded.named_lamps.iter().map(|lamp| &*lamp.name).collect();
+    assert_eq!(names, ["lampshade", "bulb", "bright bulb"]);
+    let number = loaded.materials.iter().position(|it| it.name == "bulb").expect("it is there");
+    let own = loaded.materials[number].emissive;
+    let emission = |studio: &mut Studio, edit: LampEdit| {
+        studio.app.edited.document.lamp_edits.insert("bulb".to_owned(), edit);
+        studio.settle().expect("rendered");
+        let scene = &studio.app.assets.scene.as_ref().expect("it is there").world.scene;
+        scene.materials[number].emissive
+    };
+    let none = LampEdit::default();
+    assert_eq!(emission(&mut studio, LampEdit { factor: 0.5, ..none }), own * 0.5);
+    // It stays in the list, and words for the command line switch it off, too.
+    assert_eq!(emission(&mut studio, LampEdit { off: true, ..none }), Vec3::ZERO);
+    assert_eq!(studio.app.assets.scene.as_ref().expect("there").named_lamps.len(), 3);
+    let path = Path::new("a.png");
+    let words = studio.app.render_words(FinalRender::default(), &studio.app.edited.document, path);
+    assert!(
+        words.expect("there is a picture").iter().any(|word| word.ends_with("bulb:factor=1,off"))
+    );
+}
+
 /// Factors change the picture that there is, with the samples that it has, and are taken back like all else.
 #[test]
 fn a_light_mix_changes_the_picture_that_there_is() {
@@ -412,13 +441,16 @@ fn a_light_mix_changes_the_picture_that_there_is() {
         |studio: &Studio| Arc::clone(studio.app.rendering.snapshot.as_ref().expect("one"));
     let first = snapshot(&studio);
     let names: Vec<&str> = first.groups.iter().map(|group| &*group.name).collect();
-    assert_eq!(names, ["light.sky", "light.sun", "light.surfaces"]);
+    let all = ["light.sky", "light.sun", "lamp.bright bulb", "lamp.bulb", "lamp.lampshade"];
+    assert_eq!(names, all);
     studio.app.edited.settle();
     (studio.app.edited.document.intensity, studio.app.edited.document.sun) = (3.0, 0.5);
+    let dim = LampEdit { factor: 0.25, ..LampEdit::default() };
+    studio.app.edited.document.lamp_edits.insert("bulb".to_owned(), dim);
     studio.settle().expect("rendered");
     let second = snapshot(&studio);
     let factors: Vec<f32> = second.groups.iter().map(|group| group.factor).collect();
-    assert_eq!(factors, [3.0, 1.5, 1.0]);
+    assert_eq!(factors, [3.0, 1.5, 1.0, 0.25, 1.0]);
     assert!(Arc::ptr_eq(&first.request.world, &second.request.world));
     assert_eq!(first.main.figures, second.main.figures, "nothing was rendered");
     let (image, expected) = (second.main.film.image(), &second.groups);
@@ -442,7 +474,7 @@ fn a_light_mix_changes_the_picture_that_there_is() {
         let bytes = std::fs::read(&path).expect("written");
         bytes.windows(name.len()).any(|it| it == name.as_bytes())
     };
-    assert!(has("light.sky.R") && has("light.surfaces.B"));
+    assert!(has("light.sky.R") && has("lamp.bulb.B"));
     // Without it the same light begins anew.
     studio.app.edited.document.light_mix = false;
     studio.settle().expect("rendered");
@@ -512,7 +544,7 @@ fn what_is_only_looked_at_stays_as_it_is() {
     (viewpoint.lens_radius, viewpoint.focus_distance) = (0.000_437, 0.003);
     (document.rotation_degrees, document.intensity, document.sun) = (22.517, 0.123_456, 1.062_5);
     document.background = Background::Blurred(0.123_456);
-    let scattering = glam::Vec3::new(1.234e-7, 20.0, 0.123_456_7);
+    let scattering = Vec3::new(1.234e-7, 20.0, 0.123_456_7);
     document.fog = Some(Medium { scattering, anisotropy: 0.987_65, ..Medium::default() });
     document.look.exposure_ev = 9.126;
     (document.look.lut, document.look.lut_strength) = (Some("look:soft".to_owned()), 0.123_4);

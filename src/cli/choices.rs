@@ -42,7 +42,7 @@ pub(super) struct SceneArguments {
     /// or hidden; may be given several times.
     #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse, help_heading = "Scene")]
     edits: Vec<(String, MaterialEdit)>,
-    /// Changes all point, spot and directional lights of a name: factor=NUMBER, color=#rrggbb, or off; may be given
+    /// Changes all lights and all materials that emit of a name: factor=NUMBER, color=#rrggbb, or off; may be given
     /// several times.
     #[arg(long = "lamp", value_name = "NAME:CHANGES", value_parser = LampEdit::parse, help_heading = "Scene")]
     lamp_edits: Vec<(String, LampEdit)>,

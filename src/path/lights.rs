@@ -14,7 +14,7 @@ use crate::bvh::Hit;
 use crate::color::importance;
 use crate::scene::needs::is_emitter;
 use crate::scene::surface::SurfacePoint;
-use crate::scene::{PunctualKind, PunctualLight, Scene};
+use crate::scene::{Material, PunctualKind, PunctualLight, Scene};
 
 /// A sampled point on a light, seen from a shading point.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +42,8 @@ pub struct LocalLights {
     pub(crate) tree: LightTree,
     /// How paths aim at surfaces beside them; `None` where that gains nothing.
     pub(crate) aiming: Option<Aiming>,
+    /// Factors on what materials emit, by their numbers; empty where all are 1.
+    pub(crate) emission: Vec<f32>,
 }
 
 /// Which lights inside a scene count, and how much.
@@ -52,17 +54,20 @@ pub enum LightChoice {
     All,
     /// Some.
     Some {
-        /// Whether what surfaces emit counts.
-        surfaces: bool,
-        /// Factors on point, spot and directional lights by their names; others do not count.
+        /// Factors on point, spot and directional lights, and on what materials emit, by their names.
         lamps: Arc<BTreeMap<String, f32>>,
+        /// Whether other materials that emit light count; other lights do not.
+        surfaces: bool,
     },
 }
 
 impl LightChoice {
-    /// Whether what surfaces emit counts.
-    pub(crate) fn has_surfaces(&self) -> bool {
-        matches!(self, Self::All | Self::Some { surfaces: true, .. })
+    /// Factors on what materials emit; none where all are 1.
+    fn emission(&self, materials: &[Material]) -> Vec<f32> {
+        let Self::Some { lamps, surfaces } = self else { return Vec::new() };
+        let of_others = if *surfaces { 1.0 } else { 0.0 };
+        let of_one = |material: &Material| lamps.get(&material.name).copied().unwrap_or(of_others);
+        materials.iter().map(of_one).collect()
     }
 
     /// A light as it counts.
@@ -78,6 +83,7 @@ impl LightChoice {
 impl LocalLights {
     /// Collects the chosen lights of a scene with bounds `(min, max)`.
     pub fn new(scene: &Scene, bounds: (Vec3, Vec3), choice: &LightChoice) -> Self {
+        let emission = choice.emission(&scene.materials);
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();
         let mut triangles = Vec::new();
         let mut lights = Vec::new();
@@ -85,9 +91,10 @@ impl LocalLights {
         let mut total = 0.0;
         // Instances share no lamps: the tree of lights holds places in the world.
         for triangle in scene.own_triangles() {
-            if choice.has_surfaces()
-                && emits[scene.triangle_materials[triangle as usize] as usize]
-                && let Some((moments, power)) = triangle_moments(scene, triangle)
+            let material = scene.triangle_materials[triangle as usize] as usize;
+            let factor = emission.get(material).copied().unwrap_or(1.0);
+            if emits[material]
+                && let Some((moments, power)) = triangle_moments(scene, triangle, factor)
             {
                 lights.push(Light { index: triangles.len() as u32, moments });
                 triangles.push(triangle);
@@ -110,11 +117,11 @@ impl LocalLights {
         }
         let everything = total + distant.iter().map(|(_, power)| power).sum::<f64>();
         if !(everything > 0.0 && everything.is_finite()) {
-            return Self { punctual, ..Self::default() };
+            return Self { punctual, emission, ..Self::default() };
         }
         relate(&mut lights);
         let tree = LightTree::new(lights, total, &distant, triangles.len());
-        Self { triangles, punctual, tree, aiming: None }
+        Self { triangles, punctual, tree, aiming: None, emission }
     }
 
     /// Whether there is nothing to sample.
@@ -150,10 +157,30 @@ impl LocalLights {
         let pdf_solid_angle =
             probability * area_to_solid_angle(&corners, direction, distance * distance)?;
         let point = point_at(&Hit { t: distance, triangle, barycentric }, direction);
-        let radiance = emitted(scene, &point, -direction);
+        let radiance = self.emitted(scene, &point, -direction);
         let radiance_over_pdf = radiance / pdf_solid_angle;
         let sample = LightSample { direction, distance, radiance_over_pdf, pdf_solid_angle };
         (radiance.max_element() > 0.0).then_some(sample)
+    }
+
+    /// Factor on what a material emits.
+    pub(super) fn emission_of(&self, material: u32) -> f32 {
+        self.emission.get(material as usize).copied().unwrap_or(1.0)
+    }
+
+    /// Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.
+    pub(super) fn emitted(&self, scene: &Scene, point: &SurfacePoint<'_>, to_viewer: Vec3) -> Vec3 {
+        let parameters = &point.parameters;
+        let is_seen = point.front_face || scene.materials[point.material as usize].double_sided;
+        if parameters.unlit || !is_seen {
+            return Vec3::ZERO;
+        }
+        let emitted = parameters.emissive * parameters.alpha * self.emission_of(point.material);
+        if parameters.clearcoat == 0.0 {
+            return emitted;
+        }
+        let wo = point.shading_frame.local_from_world(to_viewer);
+        emitted * bsdf::left_by_coat(parameters, point.front_face, wo)
     }
 
     /// Pdf in solid angle of [`Self::sample`] for the point of `triangle` at the end of `way`: a unit direction and a
@@ -169,23 +196,8 @@ impl LocalLights {
     }
 }
 
-/// Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.
-pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>, to_viewer: Vec3) -> Vec3 {
-    let parameters = &point.parameters;
-    let is_seen = point.front_face || scene.materials[point.material as usize].double_sided;
-    if parameters.unlit || !is_seen {
-        return Vec3::ZERO;
-    }
-    let emitted = parameters.emissive * parameters.alpha;
-    if parameters.clearcoat == 0.0 {
-        return emitted;
-    }
-    let wo = point.shading_frame.local_from_world(to_viewer);
-    emitted * bsdf::left_by_coat(parameters, point.front_face, wo)
-}
-
-/// Moments and power of an emissive triangle; `None` if nothing comes from it.
-fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
+/// Moments and power of an emissive triangle whose light has this factor; `None` if nothing comes from it.
+fn triangle_moments(scene: &Scene, triangle: u32, factor: f32) -> Option<(Moments, f64)> {
     let corners = scene.corners(triangle);
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let area = 0.5 * normal.length();
@@ -198,7 +210,8 @@ fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
         importance(point.parameters.emissive)
     };
     let probed = probes.iter().map(probe).sum::<f32>() / probes.len() as f32;
-    let intensity = (area * (probed + 0.02 * importance(material.emissive))).min(f32::MAX);
+    let mean = factor * (probed + 0.02 * importance(material.emissive));
+    let intensity = (area * mean).min(f32::MAX);
     let place = facing(&corners, intensity);
     // What shines on both sides shines half as much in a mean direction as along its normal.
     let (moments, sides) = if material.double_sided {

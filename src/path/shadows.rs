@@ -10,7 +10,6 @@ use glam::Vec3;
 
 use super::body::Body;
 use super::light_tree::Receiver;
-use super::lights;
 use super::limits::{MAX_INTERFACES, MAX_PASSES};
 use super::tracer::{Departure, Path, PathTracer};
 use super::vertex::Vertex;
@@ -133,8 +132,8 @@ impl GlassWalk {
             }
             let Some(hit) = hit else { return walk };
             let point = world.point(&hit, ray.direction);
-            if interfaces > 0 && tracer.has_emission && world.needs.has(SceneFeatures::EMITTERS) {
-                let emitted = lights::emitted(&world.scene, &point, -ray.direction);
+            if interfaces > 0 && world.needs.has(SceneFeatures::EMITTERS) {
+                let emitted = tracer.lights.emitted(&world.scene, &point, -ray.direction);
                 walk.emitted += walk.transmittance * emitted;
                 if let Some(receiver) = receiver.filter(|_| emitted.max_element() > 0.0) {
                     let (lights, scene) = (tracer.lights, &world.scene);

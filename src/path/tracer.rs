@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use super::background::Background;
 use super::body::Body;
 use super::light_tree::Receiver;
-use super::lights::{self, LocalLights};
+use super::lights::LocalLights;
 use super::limits::{self, CutOff, MAX_INTERFACES, PathLimits};
 use super::looks::{FirstHit, Looks};
 use super::splitting::{MIN_NARROW, MIN_SHARED_NARROW, UseOfVertices};
@@ -34,8 +34,6 @@ pub struct PathTracer<'a> {
     pub environment: &'a Environment,
     /// The lights inside the scene that count.
     pub lights: &'a LocalLights,
-    /// Whether what surfaces emit counts.
-    pub has_emission: bool,
     /// How NEE chooses tiles; `None` samples the map by the BSDF alone.
     pub grid: Option<&'a LightGrid>,
     /// Where it is counted what samples of the map see.
@@ -436,9 +434,8 @@ impl<'a> Path<'a> {
             self.looks.look_at(point, &bsdf, self.travelled);
         }
         if parameters.unlit {
-            if self.tracer.has_emission {
-                self.radiance += self.throughput * parameters.emissive;
-            }
+            let emitted = parameters.emissive * self.tracer.lights.emission_of(point.material);
+            self.radiance += self.throughput * emitted;
             return None;
         }
         Some(bsdf)
@@ -472,8 +469,8 @@ impl<'a> Path<'a> {
     /// Adds what a surface emits, whether the ray then passes it or not.
     fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint<'_>) {
         let world = self.tracer.world;
-        let emitted = lights::emitted(&world.scene, point, -self.ray.direction);
-        if emitted.max_element() <= 0.0 || !self.tracer.has_emission {
+        let emitted = self.tracer.lights.emitted(&world.scene, point, -self.ray.direction);
+        if emitted.max_element() <= 0.0 {
             return;
         }
         let from = self.departure;

@@ -1,6 +1,6 @@
 //! A light mix: films of each group of light add up to the picture, so a finished one is lit anew by factors.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -12,9 +12,9 @@ use crate::environment::Environment;
 use crate::image::Image;
 use crate::path::{Background, LightChoice, Lit, World};
 use crate::scene::needs::SceneFeatures;
-use crate::scene::{LampEdit, LampEdits, PunctualLight};
+use crate::scene::{LampEdit, LampEdits, NamedLamp, Scene, named_lamps};
 
-/// Most lamps, by their names, that a mix has room for: each has a film.
+/// Most lamps, by the names of lights and of materials that emit, that a mix has room for: each has a film.
 pub(crate) const MAX_LAMPS: usize = 16;
 
 /// What shines in one film alone.
@@ -30,10 +30,10 @@ enum Source {
     /// The map without its sun.
     Sky,
     Sun,
-    /// Point, spot and directional lights of a name.
+    /// Point, spot and directional lights, and surfaces that emit, of a name.
     Lamp(String),
-    /// What surfaces emit, and a colour behind them.
-    Surfaces,
+    /// What other surfaces emit or show unlit, and a colour behind them; all lamps but those of these names.
+    Rest(Vec<String>),
 }
 
 /// Factors on light, as a person sets them.
@@ -43,7 +43,7 @@ pub(crate) struct LightFactors {
     pub(crate) intensity: f32,
     /// On the map's sun, beside that.
     pub(crate) sun: f32,
-    /// On all point, spot and directional lights.
+    /// On all lamps.
     pub(crate) lamps: f32,
     /// Beside that by their names; colours are of no account.
     pub(crate) lamp_edits: LampEdits,
@@ -56,8 +56,11 @@ impl LightFactors {
 
     /// All lights inside a scene times their factors.
     pub(crate) fn local_lights(&self, world: &World) -> LightChoice {
-        let of_light = |light: &PunctualLight| (light.name.clone(), self.of_lamp(&light.name));
-        let lamps: BTreeMap<_, _> = world.scene.lights.iter().map(of_light).collect();
+        let of_lamp = |lamp: NamedLamp| (lamp.name.clone(), self.of_lamp(&lamp.name));
+        let lamps: BTreeMap<_, _> = named_lamps(&world.scene.lights, &world.scene.materials)
+            .into_iter()
+            .map(of_lamp)
+            .collect();
         match lamps.values().all(|factor| *factor == 1.0) {
             true => LightChoice::All,
             false => LightChoice::Some { surfaces: true, lamps: Arc::new(lamps) },
@@ -80,19 +83,27 @@ impl LightGroup {
             .map(|(name, source, environment)| Self { name: name.to_owned(), source, environment });
         let mut groups: Vec<Self> =
             of_map.into_iter().filter(|group| !group.environment.is_black()).collect();
-        let shining = world.scene.lights.iter().filter(|light| light.intensity != Vec3::ZERO);
-        let names: BTreeSet<&str> = shining.map(|light| &*light.name).collect();
-        groups.extend(names.into_iter().map(|name| Self {
+        let Scene { lights, materials, .. } = &world.scene;
+        let shining: Vec<_> =
+            lights.iter().filter(|it| it.intensity != Vec3::ZERO).cloned().collect();
+        let mut lamps = named_lamps(&shining, materials);
+        let are_all = lamps.len() <= MAX_LAMPS;
+        if !are_all {
+            lamps = named_lamps(&shining, &[]);
+        }
+        let mut names: Vec<String> = lamps.into_iter().map(|lamp| lamp.name).collect();
+        names.sort_unstable();
+        groups.extend(names.iter().map(|name| Self {
             name: format!("lamp.{name}"),
-            source: Source::Lamp(name.to_owned()),
+            source: Source::Lamp(name.clone()),
             environment: black.clone(),
         }));
         // A colour behind the scene has no factor either.
         let has_color = matches!(view.background, Background::Color(_));
-        let shines =
-            world.needs.features.intersects(SceneFeatures::EMITTERS | SceneFeatures::UNLIT);
+        let (needs, emitters) = (world.needs, SceneFeatures::EMITTERS);
+        let shines = needs.has(SceneFeatures::UNLIT) || needs.has(emitters) && !are_all;
         if shines || has_color || groups.is_empty() {
-            let (name, source) = ("light.surfaces".to_owned(), Source::Surfaces);
+            let (name, source) = ("light.surfaces".to_owned(), Source::Rest(names));
             groups.push(Self { name, source, environment: black });
         }
         groups
@@ -104,7 +115,7 @@ impl LightGroup {
             Source::Sky => factors.intensity,
             Source::Sun => factors.intensity * factors.sun,
             Source::Lamp(name) => factors.of_lamp(name),
-            Source::Surfaces => 1.0,
+            Source::Rest(_) => 1.0,
         }
     }
 
@@ -113,9 +124,10 @@ impl LightGroup {
     pub(crate) fn view(&self, view: &View, number: u32) -> View {
         let lamps = match &self.source {
             Source::Lamp(name) => BTreeMap::from([(name.clone(), 1.0)]),
-            _ => BTreeMap::new(),
+            Source::Rest(others) => others.iter().map(|name| (name.clone(), 0.0)).collect(),
+            Source::Sky | Source::Sun => BTreeMap::new(),
         };
-        let surfaces = matches!(self.source, Source::Surfaces);
+        let surfaces = matches!(self.source, Source::Rest(_));
         let background = match view.background {
             Background::Color(_) if !surfaces => Background::Color([0.0; 3]),
             background => background,
@@ -171,7 +183,7 @@ pub(super) mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::render::gpu::{Gpu, UploadedScene};
     use crate::render::{Phase, Session, Sharing};
-    use crate::scene::{PunctualKind, builtin};
+    use crate::scene::{PunctualKind, PunctualLight, builtin};
 
     /// A room with emissive surfaces, a lamp of one name and two of another, under a sky with a sun.
     fn room() -> (World, Environment) {
@@ -231,8 +243,11 @@ pub(super) mod tests {
         let parted = environment.parted().expect("sound maps");
         let groups = LightGroup::all_of((&world, &environment), parted, &view);
         let names: Vec<&str> = groups.iter().map(|group| &*group.name).collect();
-        let all = ["light.sky", "light.sun", "lamp.fill", "lamp.key", "light.surfaces"];
-        assert_eq!(names, all);
+        let lamps = ["bright bulb", "bulb", "fill", "key", "lampshade"];
+        let lamps = lamps.map(|name| format!("lamp.{name}"));
+        assert_eq!(names[..2], ["light.sky", "light.sun"]);
+        assert_eq!(names[2..7], lamps);
+        assert_eq!(names[7..], ["light.surfaces"]);
         let all = |gpu: Option<&Gpu>| -> Vec<Film> {
             let of_group = |(number, group): (u32, &LightGroup)| {
                 rendered((&world, &group.environment), group.view(&view, number), 64, gpu)
@@ -248,7 +263,7 @@ pub(super) mod tests {
         assert_agree(&sum, &picture, "the sum");
         assert_eq!(sum.surface_of(700), films[0].surface_of(700), "layers are the first's");
         // By other factors it is the picture of another light.
-        let edits = [("key", 0.25, false), ("fill", 1.0, true)];
+        let edits = [("key", 0.25, false), ("fill", 1.0, true), ("bulb", 0.5, false)];
         let edit = |(name, factor, off): (&str, f32, bool)| {
             (name.to_owned(), LampEdit { factor, off, ..LampEdit::default() })
         };
@@ -258,7 +273,7 @@ pub(super) mod tests {
             films.iter().zip(&groups).map(|(film, group)| (film, group.factor(&factors))).collect();
         assert_eq!(
             weighted.iter().map(|(_, factor)| *factor).collect::<Vec<_>>(),
-            [2.0, 1.0, 0.0, 0.75, 1.0]
+            [2.0, 1.0, 3.0, 1.5, 0.0, 0.75, 3.0, 1.0]
         );
         let mut lit = environment.with_sun(factors.sun).expect("a sound map");
         lit.set_intensity(factors.intensity);

@@ -215,7 +215,6 @@ impl View {
             world,
             environment,
             lights: &world.lights,
-            has_emission: self.local_lights.has_surfaces(),
             grid,
             counts: None,
             cache: None,

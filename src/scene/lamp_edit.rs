@@ -1,18 +1,20 @@
 //! Changes to point, spot and directional lights after loading.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::light::PunctualLight;
+use super::material::Material;
 use super::material_edit::{brightest, color_of_hex, hex_of_color, number_up_to};
+use super::needs::is_emitter;
 
 /// Changes to lights, by their name.
 pub type LampEdits = BTreeMap<String, LampEdit>;
 
 with_defaults! {
-    /// A change to all lights of a name.
+    /// A change to all lamps of a name: lights, and materials that emit.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
     #[serde(default)]
     pub struct LampEdit {
@@ -23,6 +25,29 @@ with_defaults! {
         /// Their colour, linear RGB in `[0,1]`, in place of their own; its brightness is of no account.
         pub color: Option<Vec3> = None,
     }
+}
+
+/// Lights of one name: point, spot and directional ones, and materials that emit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedLamp {
+    /// Theirs.
+    pub name: String,
+    /// Linear RGB of the first, the largest of which is 1.
+    pub color: Vec3,
+}
+
+/// A lamp for each name that there is among lights and materials that emit.
+pub fn named_lamps(lights: &[PunctualLight], materials: &[Material]) -> Vec<NamedLamp> {
+    let of_lights = lights.iter().map(|light| (&light.name, light.intensity));
+    let emitters = materials.iter().filter(|material| is_emitter(material));
+    let all = of_lights.chain(emitters.map(|material| (&material.name, material.emissive)));
+    let mut names = HashSet::new();
+    let first_of_name = all.filter(|(name, _)| names.insert(*name));
+    let lamp = |(name, light): (&String, Vec3)| {
+        let color = light / light.max_element().max(f32::MIN_POSITIVE);
+        NamedLamp { name: name.clone(), color }
+    };
+    first_of_name.map(lamp).collect()
 }
 
 impl LampEdit {
@@ -36,9 +61,17 @@ impl LampEdit {
 
     /// The light changed.
     pub fn apply(&self, light: &PunctualLight) -> PunctualLight {
-        let max = light.intensity.max_element();
-        let intensity = self.color.and_then(brightest).map_or(light.intensity, |color| color * max);
-        PunctualLight { intensity: intensity * self.brightness(), ..light.clone() }
+        PunctualLight { intensity: self.changed(light.intensity), ..light.clone() }
+    }
+
+    /// The material with its emission changed.
+    pub fn apply_to_material(&self, material: &Material) -> Material {
+        Material { emissive: self.changed(material.emissive), ..material.clone() }
+    }
+
+    fn changed(&self, light: Vec3) -> Vec3 {
+        let max = light.max_element();
+        self.color.and_then(brightest).map_or(light, |color| color * max) * self.brightness()
     }
 
     /// This change and then another one.
@@ -123,6 +156,9 @@ mod tests {
         assert_eq!(changed(LampEdit { color, ..none }), Vec3::new(4.0, 2.0, 0.0));
         let off = LampEdit { off: true, ..none };
         assert_eq!(changed(off), Vec3::ZERO);
+        let glass = Material { emissive: light.intensity, ..Material::lambert(0.5) };
+        let dimmed = LampEdit { factor: 0.5, ..none }.apply_to_material(&glass);
+        assert_eq!(dimmed, Material { emissive: Vec3::new(0.5, 2.0, 1.0), ..glass.clone() });
         let half = LampEdit { factor: 0.5, color, ..none };
         assert_eq!(half.then(&half).then(&off), LampEdit { off: true, factor: 0.25, color });
     }

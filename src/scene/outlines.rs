@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::instances::Surface;
-use super::{Material, MaterialEdit, Scene};
+use super::{Material, MaterialEdit, Scene, named_lamps};
 use crate::error::Decoded;
 
 /// Triangles of a material that are looked at.
@@ -172,9 +172,10 @@ impl Scene {
         none_called("material", name, self.materials.iter().map(|m| m.name.as_str()).collect())
     }
 
-    /// The same of point, spot and directional lights.
+    /// The same of lamps.
     pub(crate) fn without_lamp(&self, name: &str) -> String {
-        none_called("lamp", name, self.lights.iter().map(|light| light.name.as_str()).collect())
+        let lamps = named_lamps(&self.lights, &self.materials);
+        none_called("lamp", name, lamps.iter().map(|lamp| lamp.name.as_str()).collect())
     }
 
     /// Whether anything is left to be shown: something that is not of a hidden material.

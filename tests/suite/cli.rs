@@ -1009,6 +1009,9 @@ fn lamps_are_changed_by_name() {
     assert!(says.contains("no lamp is called \"rim\"; there are fill:warm, key"), "{says}");
     let says = bench.refusal("render office -o b.exr --lamp rim:off", 1);
     assert!(says.contains("no lamp is called \"rim\"; there are none"), "{says}");
+    let says = bench.refusal("render evening -o b.exr --lamp rim:off", 1);
+    let lamps = "there are lampshade, bulb and bright bulb";
+    assert!(says.contains(lamps), "{says}");
     let says = bench.refusal(&line("-o b.exr --lamp key:watts=3"), 2);
     assert!(says.contains("watts is not factor, color or off"), "{says}");
 }
@@ -1033,7 +1036,7 @@ fn light_groups_add_up_in_layers() {
         }
         channels
     };
-    let groups = ["light.sky", "light.sun", "light.surfaces"];
+    let groups = ["light.sky", "light.sun", "lamp.bright bulb", "lamp.bulb", "lamp.lampshade"];
     let adds_up = |name: &str| {
         let channels = read(name);
         for color in ["R", "G", "B"] {

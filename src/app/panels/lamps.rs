@@ -1,4 +1,4 @@
-//! Point, spot and directional lights: brightness of all, and each name's switch, colour and brightness.
+//! Lamps, which are lights and materials that emit: brightness of all, and each name's switch, colour and brightness.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::late::{late, late_factor};
 use super::scope::Scope;
 use crate::app::loader::LoadedScene;
-use crate::scene::{LampEdit, PunctualLight};
+use crate::scene::{LampEdit, NamedLamp};
 
 /// Most rows that are seen at once.
 const MAX_ROWS: usize = 8;
@@ -57,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, scope: &mut Scope<'_>, scene: &LoadedScene) {
     }
 }
 
-fn row(ui: &mut Ui, lamp: &PunctualLight, (edit, is_late): (&mut LampEdit, bool)) {
+fn row(ui: &mut Ui, lamp: &NamedLamp, (edit, is_late): (&mut LampEdit, bool)) {
     ui.horizontal(|ui| {
         let mut is_on = !edit.off;
         ui.checkbox(&mut is_on, "").on_hover_text("On or off");
@@ -67,8 +67,7 @@ fn row(ui: &mut Ui, lamp: &PunctualLight, (edit, is_late): (&mut LampEdit, bool)
             ui.set_min_width(NAME_WIDTH);
             ui.add(Label::new(&lamp.name).truncate());
         });
-        let own = lamp.intensity / lamp.intensity.max_element().max(f32::MIN_POSITIVE);
-        let mut rgb = edit.color.unwrap_or(own).to_array();
+        let mut rgb = edit.color.unwrap_or(lamp.color).to_array();
         let patch = ui.color_edit_button_rgb(&mut rgb).on_hover_text("Colour of its light");
         let rgb = Vec3::from(rgb).clamp(Vec3::ZERO, Vec3::ONE);
         // Black has no colour: the box switches it off.

@@ -124,8 +124,8 @@ pub(in crate::cli) struct RenderArguments {
     /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
     #[arg(long, default_value = "auto", value_name = "off|4x4|8x8|auto", help_heading = "Light")]
     pub(super) sharing: Sharing,
-    /// Renders groups of light apart: sky, sun, each lamp by its name, emissive surfaces. The picture is their sum, and
-    /// an .exr has a layer of each (light.sky, light.sun, lamp.NAME, light.surfaces). Samples and noise are asked of
+    /// Renders groups of light apart: sky, sun, each lamp or material that emits by its name. The picture is their sum,
+    /// and an .exr has a layer of each (light.sky, light.sun, lamp.NAME, light.surfaces). Samples and noise are asked of
     /// each group; seconds are shared.
     #[arg(long, conflicts_with_all = ["part", "checkpoint", "distributions", "frames", "turntable"], help_heading = "Light")]
     pub(super) light_groups: bool,
@@ -433,7 +433,9 @@ mod tests {
         use crate::app::document::{Document, Light, Look, Viewpoint};
         use crate::app::final_render::{FinalRender, Motion};
         use crate::denoise::Denoiser;
-        use crate::scene::{LampEdit, MaterialEdit, PunctualKind, PunctualLight, SceneOptions};
+        use crate::scene::{
+            LampEdit, MaterialEdit, PunctualKind, PunctualLight, Scene, SceneOptions, named_lamps,
+        };
         use crate::tone::{ToneCurve, WhiteBalance};
 
         /// The office with two lamps, two materials of one name, and axes of its own.
@@ -516,7 +518,10 @@ mod tests {
         ) -> RenderArguments {
             let options = SceneOptions { hide: vec!["a b".to_owned()], ..SceneOptions::default() };
             let to = Path::new(to);
-            let words = final_render.words(document, &world.scene, &options, Some(-1.5), to);
+            let Scene { lights, materials, .. } = &world.scene;
+            let lamps = named_lamps(lights, materials);
+            let of_file = (&options, &lamps[..]);
+            let words = final_render.words(document, &world.scene, of_file, Some(-1.5), to);
             let line = Line::try_parse_from(&words).map_err(|error| format!("{words:?}: {error}"));
             line.expect("words that are understood").arguments
         }

@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Vec3;
-
 use super::super::View;
 use super::bound::Bound;
 use super::buffers::Buffers;
@@ -81,7 +79,7 @@ impl Dispatcher {
         };
         dispatcher.put_tables(view, environment)?;
         if let Some(lights) = lights {
-            dispatcher.put_lights(view, world, lights)?;
+            dispatcher.put_lights(world, lights)?;
         }
         let buffers = &mut dispatcher.buffers;
         if features.view.contains(ViewFeatures::COUNTING) {
@@ -96,16 +94,17 @@ impl Dispatcher {
     }
 
     /// Uploads these lights.
-    fn put_lights(&mut self, view: &View, world: &World, lights: &LocalLights) -> Result<()> {
+    fn put_lights(&mut self, world: &World, lights: &LocalLights) -> Result<()> {
         let Self { buffers, globals, features, .. } = self;
         features.view.set(ViewFeatures::LOCAL_LIGHTS, !lights.is_empty());
         features.view.set(ViewFeatures::AIMING, lights.aiming.is_some());
         if features.scene_lights() {
             put_lights(buffers, globals, lights)?;
         }
-        if !view.local_lights.has_surfaces() {
+        if !lights.emission.is_empty() {
             let (mut materials, _) = layout::materials(world);
-            materials.iter_mut().for_each(|material| material.emissive = Vec3::ZERO);
+            let pairs = materials.iter_mut().zip(&lights.emission);
+            pairs.for_each(|(material, factor)| material.emissive *= factor);
             put_array(buffers, "materials", "the list of materials", &materials)?;
         }
         Ok(())

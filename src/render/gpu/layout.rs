@@ -413,7 +413,7 @@ pub(super) const PUNCTUAL_WORDS: usize = 16;
 
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u32> {
-    let LocalLights { triangles, punctual, tree, aiming } = lights;
+    let LocalLights { triangles, punctual, tree, aiming, emission: _ } = lights;
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;
     let mut words = [triangles.as_slice(), &tree.leaves].concat();

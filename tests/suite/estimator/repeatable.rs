@@ -123,7 +123,6 @@ fn counters_do_not_depend_on_the_threads() {
                 world: &setting.world,
                 environment: &setting.environment,
                 lights: &setting.world.lights,
-                has_emission: true,
                 grid: Some(&whole_map),
                 counts: Some(&learning),
                 cache: None,
