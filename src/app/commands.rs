@@ -99,6 +99,8 @@ pub enum Command {
     RenameKept(usize, String),
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
+    /// Learn once more, step by step, or forget the steps.
+    ToggleLearningSteps,
     /// Keep the inspected cell to compare others with it, or no longer.
     ToggleKeptCell,
     /// Write all distributions.

@@ -13,17 +13,18 @@ use super::document::{Document, Viewpoint};
 use super::final_render::{FinalRender, Motion, command_line};
 use super::interface::{Chosen, Purpose, Tab, Tool};
 use super::kept_picture::SMALL_WIDTH;
+use super::learning_steps::LearningSteps;
 use super::loader::Kind;
 use super::overlays::Overlay;
 use super::screen::color_image;
 use super::settings_file::{lasting, lasting_scene};
 use super::sync::stay_in_scene;
-use super::tasks::TaskResult;
-use super::worker::{Activity, Reference, Snapshot};
+use super::tasks::{TaskResult, read_reference};
+use super::worker::{Activity, Snapshot};
 use super::{convergence, desktop, save, theme};
 
 use crate::error::Result;
-use crate::image::{Image, read_picture};
+use crate::image::Image;
 use crate::render::gpu::DeviceChoice;
 use crate::render::sun_placement::SunPlacement;
 use crate::render::surface_map::look_at_place;
@@ -68,10 +69,8 @@ impl App {
                 document.look.lut = Some(name);
             }
             Command::OpenReference(name) => {
-                self.tasks.run("reference", move || {
-                    let image = read_picture(Path::new(&name))?;
-                    Ok(TaskResult::Reference(Arc::new(Reference { name, image }), None))
-                });
+                let path = PathBuf::from(&name);
+                self.tasks.run("reference", move || read_reference(name, &path, None));
             }
             Command::RenderReference => self.render_reference(),
             Command::ToggleKeptCell => self.rendering.inspector.toggle_kept(),
@@ -186,6 +185,16 @@ impl App {
             Command::MakeSmallMap => {
                 if let Some(make) = self.library.small_maps.make_next() {
                     self.tasks.run("small map", || Ok(TaskResult::SmallMaps(make())));
+                }
+            }
+            Command::ToggleLearningSteps => {
+                interface.learning_step = None;
+                let steps = self.rendering.steps.take();
+                let snapshot = self.rendering.snapshot.as_ref().filter(|_| steps.is_none());
+                if let Some(of) = snapshot.map(|snapshot| Arc::clone(&snapshot.request)) {
+                    self.rendering.steps = Some(LearningSteps::begun(&of));
+                    let learn = || Ok(TaskResult::LearningSteps(LearningSteps::learn(of)));
+                    self.tasks.run("learning steps", learn);
                 }
             }
             Command::MeasureTruth => {

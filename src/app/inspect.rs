@@ -68,7 +68,7 @@ pub(super) struct Inspector {
     /// The map that is inspected.
     environment: Option<Arc<Environment>>,
     learned: Option<(Arc<LightGrid>, Vec<f32>)>,
-    source: Option<(Vec2, u64)>,
+    source: Option<(Vec2, (u64, Option<usize>))>,
     /// Whether a truth is being measured.
     pub(super) busy: bool,
     /// A cell that others are compared with.
@@ -124,7 +124,7 @@ impl Inspector {
         let Some(snapshot) = snapshot else { return };
         self.sum_up(snapshot);
         let Some(place) = interface.inspected() else { return };
-        let source = Some((place, snapshot.number));
+        let source = Some((place, snapshot.key()));
         if self.source == source {
             return;
         }

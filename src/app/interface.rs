@@ -52,6 +52,8 @@ with_defaults! {
         pub zoom: Zoom = Zoom::default(),
         /// Where the wipe is, `[0,1]` across the picture.
         pub wipe: f32 = 0.5,
+        /// The step of learning that is looked at, if it is not the last.
+        pub learning_step: Option<usize> = None,
         /// Whether what was learned is kept as it is.
         pub is_frozen: bool = false,
         /// What the next drag or click in the picture does, if it does not move the camera.

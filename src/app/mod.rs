@@ -30,6 +30,7 @@ mod input_order;
 mod inspect;
 pub mod interface;
 pub(crate) mod kept_picture;
+mod learning_steps;
 mod library;
 pub(crate) mod loader;
 mod looks;

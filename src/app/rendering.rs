@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::camera_pictures::CameraPictures;
 use super::convergence::Convergence;
 use super::inspect::Inspector;
+use super::learning_steps::LearningSteps;
 use super::speed_up::SpeedUp;
 use super::threads::Wake;
 use super::worker::{Activity, Snapshot, Worker};
@@ -20,6 +21,8 @@ pub(super) struct Rendering {
     pub(super) convergence: Convergence,
     /// What the scene's cameras see.
     pub(super) camera_pictures: CameraPictures,
+    /// How it has learned, if somebody asked.
+    pub(super) steps: Option<LearningSteps>,
     /// The place that is looked at.
     pub(super) inspector: Inspector,
     /// The render thread.
@@ -42,6 +45,7 @@ impl Rendering {
         Ok(Self {
             convergence: Convergence::default(),
             camera_pictures: CameraPictures::default(),
+            steps: None,
             inspector: Inspector::default(),
             worker: Worker::start(wake, gpu, screen)?,
             snapshot: None,
@@ -57,8 +61,23 @@ impl Rendering {
             self.convergence.add(snapshot.main.sampling, &snapshot.curves);
             let plain = snapshot.plain.as_ref();
             self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
+            self.steps.take_if(|steps| !steps.is_of(&snapshot.request));
             self.snapshot = Some(snapshot);
         }
+    }
+
+    /// Takes steps that somebody still waits for.
+    pub(super) fn take_steps(&mut self, steps: LearningSteps) {
+        if self.steps.as_ref().is_some_and(|awaited| awaited.has_request_of(&steps)) {
+            self.steps = Some(steps);
+        }
+    }
+
+    /// The latest picture, with what was known at a step of learning.
+    pub(super) fn snapshot_at(&self, step: Option<usize>) -> Option<Arc<Snapshot>> {
+        let snapshot = self.snapshot.as_ref()?;
+        let at_step = step.and_then(|step| self.steps.as_ref()?.at(step, snapshot));
+        Some(at_step.unwrap_or_else(|| Arc::clone(snapshot)))
     }
 
     /// Whether no light reaches what the camera sees, if that has not been said of this scene.
@@ -80,7 +99,8 @@ impl Rendering {
     pub(super) fn is_done(&self) -> bool {
         let is_answer =
             |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
-        self.snapshot.as_ref().is_some_and(is_answer) && !self.inspector.busy
+        let is_learning = self.steps.as_ref().is_some_and(LearningSteps::is_busy);
+        self.snapshot.as_ref().is_some_and(is_answer) && !self.inspector.busy && !is_learning
     }
 
     /// Whether a GPU renders or is being made ready for it, where this device was chosen.

@@ -9,11 +9,14 @@ use egui_wgpu::{Renderer, ScreenDescriptor};
 use wgpu::{TextureFormat, TextureUsages};
 
 use super::application::{App, Start};
+use super::commands::Command;
 use super::interface::Interface;
+use super::learning_steps::LearningSteps;
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
 use super::theme;
 use super::threads::{Wake, Wakes};
+use super::worker::Reference;
 use crate::error::{Error, Result};
 use crate::image::{Image, Rgb8};
 use crate::render::gpu::{DeviceChoice, Gpu, texture};
@@ -86,10 +89,30 @@ impl Studio {
         self.app.interface = Interface { viewport_pixels, viewport_of, ..interface };
     }
 
+    /// Shows what was known after so many passes of learning.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or there are fewer passes.
+    pub fn show_learning_step(&mut self, step: usize) -> Result<()> {
+        self.settle()?;
+        if self.app.rendering.steps.is_none() {
+            self.app.execute(Command::ToggleLearningSteps, &self.context);
+        }
+        self.settle()?;
+        let count = self.app.rendering.steps.as_ref().map_or(0, LearningSteps::count);
+        if step >= count {
+            return Err(Error::new(format!(
+                "there is no learning step {step}: it has {count}, counted from 0"
+            )));
+        }
+        self.app.interface.learning_step = Some(step);
+        Ok(())
+    }
+
     /// Measures the truth at the pinned place.
     pub fn measure_truth(&mut self) -> Result<()> {
         self.settle()?;
-        self.app.execute(super::commands::Command::MeasureTruth, &self.context);
+        self.app.execute(Command::MeasureTruth, &self.context);
         Ok(())
     }
 
@@ -98,12 +121,32 @@ impl Studio {
     /// # Errors
     /// If a file cannot be read, or the reference is not rendered.
     pub fn render_reference(&mut self) -> Result<Image> {
+        Ok(self.wait_for_reference(Command::RenderReference)?.image.clone())
+    }
+
+    /// Measures errors against a linear picture without noise of what is shown.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or the picture has another size.
+    pub fn open_reference(&mut self, name: &str) -> Result<()> {
+        let reference = self.wait_for_reference(Command::OpenReference(name.to_owned()))?;
+        let Image { width, height, .. } = reference.image;
+        match self.picture_size() {
+            Some([w, h]) if (w, h) != (width, height) => Err(Error::at(
+                name,
+                format!("it has {width} x {height} pixels, the picture in the window {w} x {h}"),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn wait_for_reference(&mut self, command: Command) -> Result<Arc<Reference>> {
         self.settle()?;
-        self.app.execute(super::commands::Command::RenderReference, &self.context);
+        self.app.execute(command, &self.context);
         loop {
             self.frame()?;
             if let Some(reference) = &self.app.assets.reference {
-                return Ok(reference.image.clone());
+                return Ok(Arc::clone(reference));
             }
             if let Some(error) = self.app.messages.first_error() {
                 return Err(Error::new(error));

@@ -12,11 +12,10 @@ use super::interface::Chosen;
 use super::library::Library;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::messages::Messages;
-use super::tasks::TaskResult;
-use super::worker::{Reference, Request, Snapshot};
+use super::tasks::{TaskResult, read_reference};
+use super::worker::{Request, Snapshot};
 use crate::denoise::Denoiser;
 use crate::error::Error;
-use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 use crate::render::light_groups::MAX_LAMPS;
 use crate::sources;
@@ -67,11 +66,10 @@ impl App {
         }
         if let Some((path, of)) = self.renders.take_reference() {
             self.tasks.run("reference", move || {
-                let image = read_picture(&path);
+                let read = read_reference("a render of its own".to_owned(), &path, Some(of));
                 // A temporary file that stays does no harm.
                 let _ = std::fs::remove_file(&path);
-                let name = "a render of its own".to_owned();
-                Ok(TaskResult::Reference(Arc::new(Reference { name, image: image? }), Some(of)))
+                read
             });
         }
         self.take_render_failures();
@@ -194,6 +192,7 @@ impl App {
             }
             TaskResult::CameraPicture(made) => self.rendering.camera_pictures.take(made, context),
             TaskResult::SmallMaps(found) => self.library.small_maps.take(found, context),
+            TaskResult::LearningSteps(steps) => self.rendering.take_steps(steps),
             TaskResult::Truth(truth) => self.rendering.inspector.take(truth),
             TaskResult::Done(sentence) => self.messages.notice(sentence),
             TaskResult::Failed(sentence) => self.messages.error(sentence),
@@ -286,7 +285,8 @@ impl App {
         {
             self.saves.write(picture, &mut self.tasks);
         }
-        if let Some(snapshot) = self.rendering.snapshot.as_ref().filter(|s| s.has_picture()) {
+        let snapshot = self.rendering.snapshot_at(self.interface.learning_step);
+        if let Some(snapshot) = snapshot.as_ref().filter(|snapshot| snapshot.has_picture()) {
             let document = &self.edited.document;
             // Kept pictures are whole ones.
             let is_whole = document.region.is_none() && snapshot.request.view.crop.is_none();

@@ -1,5 +1,6 @@
 //! What runs beside the window: reading and writing files, and asking the desktop.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
@@ -8,11 +9,13 @@ use super::camera_pictures::CameraPicture;
 use super::document::Document;
 use super::inspect::Truth;
 use super::kept_picture::KeptPicture;
+use super::learning_steps::LearningSteps;
 use super::looks::ReadLook;
 use super::small_maps::SmallMapsFound;
 use super::threads::{Wake, spawn};
 use super::worker::Reference;
 use crate::error::Result;
+use crate::image::read_picture;
 
 /// What comes back from a task.
 pub(super) enum TaskResult {
@@ -26,6 +29,8 @@ pub(super) enum TaskResult {
     Reference(Arc<Reference>, Option<Box<Document>>),
     /// A look that was read.
     Look(ReadLook),
+    /// How the picture has learned.
+    LearningSteps(LearningSteps),
     /// What is true at the inspected point.
     Truth(Truth),
     /// Pictures that earlier windows kept.
@@ -34,6 +39,18 @@ pub(super) enum TaskResult {
     CameraPicture(CameraPicture),
     /// Maps in small.
     SmallMaps(SmallMapsFound),
+}
+
+/// Reads a picture that errors are to be measured against.
+///
+/// # Errors
+/// If the file is no linear picture.
+pub(super) fn read_reference(
+    name: String,
+    path: &Path,
+    of: Option<Box<Document>>,
+) -> Result<TaskResult> {
+    Ok(TaskResult::Reference(Arc::new(Reference { name, image: read_picture(path)? }), of))
 }
 
 /// Threads for one task each, and their results.

@@ -177,29 +177,20 @@ choices! {
 
 #[cfg(feature = "window")]
 choices! {
-    Overlay {
-        Cells = "cells": "Cells of the Light Grid"
-        Faces = "faces": "Six-fold split of cells by the direction a surface faces"
-        Learned = "learned": "Cells with distributions of their own"
-        Visits = "visits": "Learning visits of each cell"
-        Sky = "sky": "How much of the sky learning found visible"
-        BestTile = "best-tile": "Each cell's most important tile"
-        Entropy = "entropy": "Entropy of the cell's distribution"
-        Distance = "distance": "Distance of the cell's distribution from the whole map's"
-        Tile = "tile": "Each cell's probability of the tile chosen on the map"
-        CacheCells = "cache-cells": "Cells of the radiance cache, which cached light comes from"
-        CacheRadiance = "cache-radiance": "Radiance of those cells, developed as the picture is"
-        CacheSamples = "cache-samples": "What has trained those cells"
-        Sun = "sun": "What the map's sun shines on"
-        Samples = "samples": "Samples of each pixel"
-        Error = "error": "Estimated error of each pixel"
-        Albedo = "albedo": "Albedo of the first surface"
-        Normal = "normal": "Normal of the first surface"
-        Depth = "depth": "Distance of the first surface"
-    }
     TileView {
         Energy = "energy": "Share of the map's energy"
         Learned = "learned": "Share of what all cells together have learned to sample"
+    }
+}
+
+#[cfg(feature = "window")]
+impl ValueEnum for Overlay {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.description()))
     }
 }
 

@@ -64,6 +64,10 @@ pub(super) struct ScreenshotArguments {
     /// What is drawn over the picture.
     #[arg(long, value_name = "NAME")]
     overlay: Option<Overlay>,
+    /// A linear picture of this view without noise, .exr or .hdr, of the size of the picture in the window, that errors
+    /// are measured against.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<String>,
     /// What else is open; may be given several times.
     #[arg(long, value_name = "NAME")]
     panel: Vec<PanelName>,
@@ -94,6 +98,9 @@ pub(super) struct ScreenshotArguments {
     /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
     #[arg(long, value_parser = values::place, allow_hyphen_values = true, value_name = "X,Y")]
     inspect: Option<Vec2>,
+    /// Shows what was known after so many passes of learning in place of what is known by now; 0 is nothing.
+    #[arg(long, value_name = "N")]
+    learning_step: Option<usize>,
     /// The material whose settings are shown, by its name.
     #[arg(long, value_name = "MATERIAL")]
     select: Option<String>,
@@ -153,6 +160,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.overlay == Some(Overlay::Tile) && arguments.tile.is_none() {
         return Err(Error::new("the overlay of a tile wants one: --tile N"));
     }
+    if arguments.overlay == Some(Overlay::Flip) && arguments.reference.is_none() {
+        return Err(Error::new("the overlay flip wants a picture without noise: --reference FILE"));
+    }
     if arguments.panel.len() > 1 && arguments.panel.contains(&PanelName::None) {
         return Err(Error::new("--panel none and other panels exclude each other"));
     }
@@ -197,6 +207,12 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     }
     if let Some(tile) = arguments.tile {
         studio.check_tile(tile)?;
+    }
+    if let Some(reference) = &arguments.reference {
+        studio.open_reference(reference)?;
+    }
+    if let Some(step) = arguments.learning_step {
+        studio.show_learning_step(step)?;
     }
     if arguments.inspect.is_some() {
         studio.measure_truth()?;

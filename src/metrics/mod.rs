@@ -1,7 +1,7 @@
 //! Comparing pictures, and deciding whether two estimates agree.
 
 #[cfg_attr(not(feature = "flip"), path = "no_flip.rs")]
-mod flip;
+pub(crate) mod flip;
 pub mod hypothesis;
 
 use rayon::prelude::*;
@@ -69,7 +69,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
         trimmed_rel_mse: trimmed_mean(&mut relative),
         block_rel_mse: trimmed_mean(&mut of_blocks),
         mean_ratio: mean(image) / reference_mean,
-        flip: flip::mean(image, reference, flip_exposure_ev),
+        flip: flip::errors(image, reference, flip_exposure_ev).map(|(_, mean)| mean),
         flip_exposure_ev,
     })
 }

@@ -67,6 +67,7 @@ fn overlays_and_panels_look_as_they_did() {
         ("panel-shortcuts".to_owned(), Interface { shortcuts: true, ..base.clone() }),
         ("panel-none".to_owned(), Interface { panels: false, ..base }),
     ];
+    // Without a reference it is said what is missing.
     for overlay in Overlay::ALL {
         let name = format!("overlay-{}", overlay.title().to_lowercase().replace([' ', '\''], "-"));
         let state = Interface { overlay: Some(overlay), tile: Some(48), ..inspect.clone() };
@@ -215,6 +216,52 @@ fn a_reference_is_rendered_beside_the_window() {
     assert!(reference != rendered, "random numbers differ");
     let error = lightgrid::metrics::relative_rms_error(&rendered, &reference).expect("same size");
     assert!(error < 0.1, "{error}");
+    // Against it the picture is not equal everywhere, and it is said how far apart they are.
+    let overlay = |overlay| Interface { overlay, tab: Tab::Inspect, ..Interface::default() };
+    studio.arrange(overlay(Some(Overlay::Areas)));
+    let areas = studio.take().expect("drawn");
+    studio.arrange(overlay(Some(Overlay::Flip)));
+    let differences = studio.take().expect("drawn");
+    assert!(areas != differences);
+    // Another size cannot be compared.
+    let other = folder.path().join("other.exr");
+    let line = "render open --size 24x16 --spp 1 --device cpu -o";
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+    let status = command.args(line.split_whitespace()).arg(&other).status().expect("started");
+    assert!(status.success());
+    let said = studio.open_reference(&other.display().to_string()).expect_err("smaller");
+    let sizes = "it has 24 x 16 pixels, the picture in the window 48 x 32";
+    assert!(said.to_string().contains(sizes), "{said}");
+    studio.arrange(overlay(None));
+    let without = studio.take().expect("drawn");
+    assert!(without != differences);
+}
+
+/// What was known after each pass of learning is shown again.
+#[test]
+fn learning_is_stepped_through() {
+    let Some(mut studio) = studio(start(), (1000, 640)) else { return };
+    let state = Interface {
+        tab: Tab::Inspect,
+        overlay: Some(Overlay::Learned),
+        tiles: TileView::Learned,
+        ..Interface::default()
+    };
+    let take = |step: Option<usize>| {
+        studio.arrange(state.clone());
+        step.into_iter().for_each(|step| studio.show_learning_step(step).expect("there is one"));
+        studio.take().expect("drawn")
+    };
+    let pictures = [Some(1), Some(4), Some(7), None].map(take);
+    let learned = |picture: &Rgb8| {
+        let is_own = |[r, g, b]: &&[u8; 3]| *g > *r && *g > *b;
+        picture.pixels.iter().filter(is_own).count()
+    };
+    let [first, middle, last, now] = &pictures;
+    assert!(learned(first) < learned(middle) && learned(middle) < learned(last), "more is known");
+    assert!(last != now, "the slider says so");
+    let said = studio.show_learning_step(8).expect_err("there is none").to_string();
+    assert!(said.contains("there is no learning step 8: it has 8, counted from 0"), "{said}");
 }
 
 /// A driver that resets takes the device with it; the window goes on with another, and nothing of

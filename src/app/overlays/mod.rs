@@ -4,8 +4,10 @@ use rayon::prelude::*;
 
 use crate::develop::DevelopSettings;
 use crate::environment::sun::Sun;
+use crate::image::Image;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
+use crate::metrics::flip;
 use crate::render::film::{Film, Pixel};
 use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
@@ -26,6 +28,11 @@ pub use painted::Legend;
 pub(super) use painted::Painted;
 use painted::{Range, scaled};
 
+/// Sides of the areas whose error is shown, in pixels.
+const AREA: u32 = 8;
+/// FLIP at the bright end of its scale.
+const MAX_FLIP: f32 = 0.5;
+
 /// What overlays are drawn from.
 pub(super) struct Sources<'a> {
     /// The film, what was rendered with, and what was learned.
@@ -34,6 +41,8 @@ pub(super) struct Sources<'a> {
     pub(super) surfaces: Option<&'a SurfaceMap>,
     /// Facts of the cells of its grid.
     pub(super) facts: Option<&'a CellFacts>,
+    /// The picture on the screen, for the overlay that compares it with the reference.
+    pub(super) image: Option<&'a Image>,
     /// How light is developed.
     pub(super) settings: Option<DevelopSettings>,
     /// The tile chosen on the map.
@@ -52,6 +61,8 @@ impl Sources<'_> {
             Overlay::Error => {
                 Some(scaled(pixels.map(relative_error), Range::Logarithmic, "of the luminance"))
             }
+            Overlay::Areas => Some(self.areas()),
+            Overlay::Flip => self.flip(),
             Overlay::Sun => self.sunlit(),
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
             _ if overlay.is_of_cache() => {
@@ -60,6 +71,28 @@ impl Sources<'_> {
             }
             _ => self.cells(overlay),
         }
+    }
+
+    /// Of the film that most of the picture comes from.
+    fn areas(&self) -> Painted {
+        let own = &self.snapshot.main.film;
+        let cached = self.snapshot.backdrop.as_ref();
+        let cached = cached.filter(|cached| cached.samples > own.total_samples());
+        let film = cached.map_or(own, |cached| &cached.film);
+        let size = [film.width.div_ceil(AREA), film.height.div_ceil(AREA)];
+        let of_area = |index: u32| error_of_area(film, [index % size[0], index / size[0]]);
+        let errors: Vec<_> = (0..size[0] * size[1]).into_par_iter().map(of_area).collect();
+        let places = (0..film.height).flat_map(|y| (0..film.width).map(move |x| [x, y]));
+        let of_place = |[x, y]: [u32; 2]| errors[(y / AREA * size[0] + x / AREA) as usize];
+        scaled(places.map(of_place), Range::Logarithmic, "of the luminance")
+    }
+
+    fn flip(&self) -> Option<Painted> {
+        let reference = self.snapshot.request.reference.as_ref()?;
+        let exposure_ev = self.settings.as_ref()?.exposure_ev;
+        let (errors, mean) = flip::errors(self.image?, &reference.image, exposure_ev)?;
+        let unit = format!("FLIP, mean {mean:.4}");
+        Some(scaled(errors.into_iter().map(Some), Range::Fixed(0.0, MAX_FLIP), unit))
     }
 
     fn sunlit(&self) -> Option<Painted> {
@@ -163,6 +196,21 @@ pub fn value_text(overlay: Overlay, film: &Film, index: usize) -> Option<String>
 
 fn relative_error(pixel: &Pixel) -> Option<f32> {
     let error = pixel.variance_of_mean().sqrt() / pixel.mean_luminance();
+    (error.is_finite() && error > 0.0).then_some(error as f32)
+}
+
+/// Standard error over luminance of the mean of an area, by its number of column and row.
+fn error_of_area(film: &Film, [column, row]: [u32; 2]) -> Option<f32> {
+    let columns = column * AREA..((column + 1) * AREA).min(film.width);
+    let rows = row * AREA..((row + 1) * AREA).min(film.height);
+    let row = |y: u32| {
+        let place = |x: u32| (y * film.width + x) as usize;
+        &film.pixels()[place(columns.start)..place(columns.end)]
+    };
+    let pixels = || rows.clone().flat_map(row);
+    let luminance: f64 = pixels().map(Pixel::mean_luminance).sum();
+    let variance: f64 = pixels().map(Pixel::variance_of_mean).sum();
+    let error = variance.sqrt() / luminance;
     (error.is_finite() && error > 0.0).then_some(error as f32)
 }
 

@@ -15,7 +15,7 @@ pub enum Legend {
         /// Whether colours follow the logarithm.
         logarithmic: bool,
         /// Unit of the values.
-        unit: &'static str,
+        unit: String,
     },
     /// One colour, one meaning.
     Names(Vec<([u8; 3], String)>),
@@ -66,7 +66,7 @@ const MAX_RATIO: f32 = 1e4;
 pub(super) fn scaled(
     values: impl Iterator<Item = Option<f32>>,
     range: Range,
-    unit: &'static str,
+    unit: impl Into<String>,
 ) -> Painted {
     let values: Vec<Option<f32>> = values.collect();
     let mut sorted: Vec<f32> = values.iter().flatten().copied().collect();
@@ -93,5 +93,5 @@ pub(super) fn scaled(
         }
     };
     let colors = values.iter().map(|v| v.map(|v| palette::viridis(position(v)))).collect();
-    Painted::new(colors, Legend::Scale { low, high, logarithmic, unit })
+    Painted::new(colors, Legend::Scale { low, high, logarithmic, unit: unit.into() })
 }

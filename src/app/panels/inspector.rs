@@ -8,6 +8,7 @@ use super::{color_bar, map_view, overlay, pixel_light};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
 use crate::app::interface::{Interface, Purpose, TileView};
+use crate::app::learning_steps::LearningSteps;
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
 use crate::app::rendering::Rendering;
@@ -25,7 +26,7 @@ const LISTED: usize = 8;
 /// Draws the map view and the inspector.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let Scope { interface, assets, rendering, commands, .. } = scope;
-    let Rendering { inspector, snapshot, .. } = &**rendering;
+    let Rendering { inspector, snapshot, steps, .. } = &**rendering;
     let (Some(map), snapshot) = (&assets.map, snapshot.as_deref()) else { return };
     theme::section(ui, "TILES OF THE MAP");
     tile_views(ui, interface);
@@ -55,6 +56,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     }
     let hint = "Keeps the learned distributions, around their old centre, when the camera or a setting changes";
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(hint);
+    learning_steps(ui, interface, steps.as_ref(), commands);
     if let Some(snapshot) = snapshot {
         theme::section(ui, "PICTURE");
         picture(ui, snapshot);
@@ -97,6 +99,34 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
             "All distributions as .csv, .json or .exr (one row a distribution, one column a tile)";
         button(ui, ("Export distributions…", hint), commands, Command::Ask(Purpose::Distributions));
     }
+}
+
+/// Asks for the steps in which the picture has learned, and chooses one.
+fn learning_steps(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    steps: Option<&LearningSteps>,
+    commands: &mut Vec<Command>,
+) {
+    let (name, hint) = match steps {
+        None => {
+            ("Step through learning", "Learns once more, and keeps what is known after each pass")
+        }
+        Some(steps) if steps.is_busy() => ("Learning…", "Ends it"),
+        Some(_) => ("Forget the steps", "Back to what is known by now"),
+    };
+    button(ui, (name, hint), commands, Command::ToggleLearningSteps);
+    let Some(steps) = steps.filter(|steps| !steps.is_busy()) else { return };
+    let last = steps.count();
+    let mut step = interface.learning_step.unwrap_or(last);
+    let paths = |step: f64, _| match steps.paths(step as usize) {
+        Some(paths) => format!("{} paths", theme::count(paths)),
+        None => "now".to_owned(),
+    };
+    let slider = theme::slider(&mut step, 0..=last).custom_formatter(paths);
+    let hint = "Paths that are known: tiles, overlays and cells show what they have taught. The picture stays";
+    theme::set(ui, "Learned from", hint, slider);
+    interface.learning_step = Some(step).filter(|step| *step < last);
 }
 
 fn tile_views(ui: &mut Ui, interface: &mut Interface) {

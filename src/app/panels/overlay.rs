@@ -38,6 +38,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         None if shown.is_some_and(|shown| shown.order.covers_now()) => {
             theme::note(ui, "Kept pictures have no overlays.");
         }
+        None if overlay == Overlay::Flip => {
+            theme::note(ui, "It needs a reference of this view and size: see Convergence.");
+        }
         None => theme::note(ui, "The Light Grid has no cells yet."),
     }
     if let Some(Ok(cache)) = cache {

@@ -10,7 +10,7 @@ use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::overlays::{CellFacts, Overlay, Painted, Sources};
 use crate::app::worker::{Request, Snapshot};
-use crate::develop::{DevelopSettings, Developer, LinearPicture, OverlayTexture};
+use crate::develop::{DevelopSettings, Developer, OverlayTexture};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
@@ -77,7 +77,7 @@ pub(super) struct Memory {
 }
 
 /// Snapshot, overlay, tile, and how light is developed: what an overlay is painted from.
-type OverlayKey = (u64, Overlay, Option<u32>, Option<DevelopSettings>);
+type OverlayKey = ((u64, Option<usize>), Overlay, Option<u32>, Option<DevelopSettings>);
 
 /// What is on one device.
 #[derive(Default)]
@@ -190,8 +190,8 @@ impl Memory {
                 tone: tone.clone(),
                 opacity: [0.0; 2],
             });
-            let key = (order.snapshot.number, overlay, order.tile, settings.clone());
-            let paint = || Ok(self.paint(order, overlay, settings, &completed.picture));
+            let key = (order.snapshot.key(), overlay, order.tile, settings.clone());
+            let paint = || Ok(self.paint(order, overlay, settings, &completed));
             let painted = last.or_make(key, paint);
             self.uploads.overlay = last;
             painted
@@ -282,13 +282,16 @@ impl Memory {
         order: &Order,
         overlay: Overlay,
         settings: Option<DevelopSettings>,
-        picture: &LinearPicture,
+        shown: &Prepared,
     ) -> Option<Painted<OverlayTexture>> {
         if overlay.needs_surfaces() {
             self.prepare(&order.snapshot);
         }
+        let image = || shown.image.clone().unwrap_or_else(|| Arc::new(order.image()));
+        let image = (overlay == Overlay::Flip).then(image);
         let sources = Sources {
             snapshot: &order.snapshot,
+            image: image.as_deref(),
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
             settings,
@@ -297,7 +300,7 @@ impl Memory {
         };
         let painted = sources.paint(overlay)?;
         let (gpu, width) = (&order.developer.gpu, order.snapshot.main.film.width);
-        let colors = OverlayTexture::of_colors(gpu, &painted.colors, width, picture);
+        let colors = OverlayTexture::of_colors(gpu, &painted.colors, width, &shown.picture);
         Some(Painted { colors, legend: painted.legend, labels: painted.labels })
     }
 

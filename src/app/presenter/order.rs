@@ -43,7 +43,7 @@ impl PartialEq for Order {
         let ahead = |of: &Self| of.ahead.as_ref().map(Arc::as_ptr);
         let settings = |of: &Self| (of.denoiser, of.metered, of.overlay, of.tile, of.sun);
         Arc::ptr_eq(&self.developer, &other.developer)
-            && self.snapshot.number == other.snapshot.number
+            && self.snapshot.key() == other.snapshot.key()
             && ahead(self) == ahead(other)
             && settings(self) == settings(other)
             && self.look == other.look
@@ -116,6 +116,7 @@ impl Order {
         self.is_same_work(before)
             && !is_over
             && !is_first
+            && now.learning_step == then.learning_step
             && Self { snapshot, ..self.clone() } == *before
     }
 }

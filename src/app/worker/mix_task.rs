@@ -230,6 +230,7 @@ impl<'a> MixTask<'a> {
             request: Arc::clone(&request),
         });
         let samples = pictures.iter().map(|picture| picture.samples(true)).sum();
+            learning_step: None,
         self.published = Some((Instant::now(), request, activity, samples));
         self.publish_gap = gap_after(start.elapsed());
     }

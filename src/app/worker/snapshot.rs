@@ -104,6 +104,8 @@ pub(crate) enum NoCache {
 pub(crate) struct Snapshot {
     /// Counts snapshots.
     pub number: u64,
+    /// The step of learning whose grid and counters these are; `None` is the last.
+    pub learning_step: Option<usize>,
     /// What it was rendered for.
     pub request: Arc<Request>,
     /// What is going on.
@@ -165,6 +167,11 @@ pub(crate) struct Backdrop {
 }
 
 impl Snapshot {
+    /// Equal snapshots alone have the same.
+    pub(crate) fn key(&self) -> (u64, Option<usize>) {
+        (self.number, self.learning_step)
+    }
+
     /// Samples a pixel of the picture by now, in the mean, of cached light too.
     pub(crate) fn mean_samples(&self) -> f64 {
         let main = self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64;

@@ -416,6 +416,7 @@ impl<'a> PictureTask<'a> {
         let cut_off = self.sessions.cut_off(main.samples());
         let trained = cached.as_ref().map_or(main, |cached| &cached.session);
         let kept = &mut *self.sessions.kept;
+            learning_step: None,
         kept.snapshots += 1;
         shared.publish(Snapshot {
             number: kept.snapshots,

@@ -37,6 +37,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
     Snapshot {
         number: main.figures.samples,
         request: Arc::clone(request),
+        learning_step: None,
         activity: Activity::Rendering,
         now: main.figures,
         main,
