@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::inspection::Inspection;
 use super::preview::{MAX_GAP, gap_after};
 use super::request::Request;
+use super::session_cache::{SuspendedPicture, SuspendedSession};
 use super::sessions::Sessions;
 use super::snapshot::{Activity, Backdrop, NoCache, SessionSnapshot, Snapshot};
 use crate::render::block_errors::block_errors;
@@ -67,9 +68,13 @@ impl<'a> MixTask<'a> {
     pub(super) fn work(mut self, groups: &'a [LightGroup]) -> Arc<Request> {
         let (world, view) = (self.sessions.world, self.sessions.watch.request.view.clone());
         let may_cache = suits(world, &view);
+        let left = self.sessions.kept.come_back(&self.sessions.watch.request);
+        let mut left = left.into_iter().flat_map(|left| left.sessions);
         let begin = |(number, group): (u32, &'a LightGroup)| {
-            let main = Session::new(world, &group.environment, group.view(&view, number));
-            GroupPicture { group, main, cached: None, turns: 0 }
+            let lit = (world, &group.environment);
+            let begun = || (Session::new(lit.0, lit.1, group.view(&view, number)), None);
+            let (main, cached) = left.next().map_or_else(begun, |left| left.resume(lit));
+            GroupPicture { group, main, cached, turns: 0 }
         };
         let mut pictures: Vec<_> = (0..).zip(groups).map(begin).collect();
         while self.sessions.watch.takes_up_latest() {
@@ -90,7 +95,18 @@ impl<'a> MixTask<'a> {
                 self.sessions.rest();
             }
         }
-        self.sessions.watch.request
+        let Sessions { watch, kept, .. } = self.sessions;
+        if watch.request.previews {
+            let suspend = |it: GroupPicture<'_>| SuspendedSession::of(it.main, it.cached);
+            kept.leave(SuspendedPicture {
+                request: Arc::clone(&watch.request),
+                sessions: pictures.into_iter().map(suspend).collect(),
+                counters: None,
+                curve: Vec::new(),
+                cached_seconds: 0.0,
+            });
+        }
+        watch.request
     }
 
     /// What is to be done next.
@@ -214,6 +230,7 @@ impl<'a> MixTask<'a> {
         kept.snapshots += 1;
         shared.publish(Snapshot {
             number: kept.snapshots,
+            learning_step: None,
             activity,
             now: main.figures,
             cached_seconds: seconds - main.figures.elapsed_seconds(),
@@ -230,7 +247,6 @@ impl<'a> MixTask<'a> {
             request: Arc::clone(&request),
         });
         let samples = pictures.iter().map(|picture| picture.samples(true)).sum();
-            learning_step: None,
         self.published = Some((Instant::now(), request, activity, samples));
         self.publish_gap = gap_after(start.elapsed());
     }

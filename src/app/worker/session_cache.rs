@@ -8,10 +8,10 @@ use super::snapshot::Point;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::World;
+use crate::path::{Lit, World};
 use crate::render::cached_picture::CachedPicture;
 use crate::render::light_groups::LightFactors;
-use crate::render::{CacheTraining, SessionState};
+use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.
 #[derive(Default)]
@@ -37,9 +37,8 @@ pub(super) struct SessionCache {
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
 pub(super) struct SuspendedPicture {
     pub(super) request: Arc<Request>,
-    pub(super) session: SessionState,
-    /// The picture by cached light beside it.
-    pub(super) cached: Option<CachedPicture<SessionState>>,
+    /// One, or of a light mix one for each group.
+    pub(super) sessions: Vec<SuspendedSession>,
     /// What learning had counted, for inspection.
     pub(super) counters: Option<Arc<LearningGrid>>,
     /// How its error fell.
@@ -48,19 +47,33 @@ pub(super) struct SuspendedPicture {
     pub(super) cached_seconds: f64,
 }
 
-impl SuspendedPicture {
-    /// Whether it has taken long, and there is room for it; if need be without the picture by cached light.
-    pub(super) fn is_worth_it(&mut self) -> bool {
-        if self.memory_bytes() > MAX_LEFT_BYTES {
-            self.cached = None;
-        }
-        let seconds = self.session.elapsed_seconds() + self.cached_seconds;
-        seconds >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
+/// A session that was put aside, and the one by cached light beside it.
+pub(super) struct SuspendedSession {
+    session: SessionState,
+    cached: Option<CachedPicture<SessionState>>,
+}
+
+impl SuspendedSession {
+    pub(super) fn of(main: Session<'_>, cached: Option<CachedPicture<Session<'_>>>) -> Self {
+        let cached = cached.map(|cached| cached.map(Session::suspend));
+        Self { session: main.suspend(), cached }
+    }
+
+    /// Goes on in the same world under the same map.
+    pub(super) fn resume(self, lit: Lit<'_>) -> (Session<'_>, Option<CachedPicture<Session<'_>>>) {
+        let resume = |state| Session::resume(lit, state);
+        (resume(self.session), self.cached.map(|cached| cached.map(resume)))
     }
 
     fn memory_bytes(&self) -> usize {
         let cached = self.cached.as_ref().map(|cached| cached.session.memory_bytes());
         self.session.memory_bytes() + cached.unwrap_or(0)
+    }
+}
+
+impl SuspendedPicture {
+    fn memory_bytes(&self) -> usize {
+        self.sessions.iter().map(SuspendedSession::memory_bytes).sum()
     }
 
     /// Bytes of its map, unless that is the one in use.
@@ -89,6 +102,18 @@ pub(super) struct Learned {
 }
 
 impl SessionCache {
+    /// Keeps a picture that has taken long, if there is room for it; if need be without the one by cached light.
+    pub(super) fn leave(&mut self, mut left: SuspendedPicture) {
+        if left.memory_bytes() > MAX_LEFT_BYTES {
+            left.sessions.iter_mut().for_each(|it| it.cached = None);
+        }
+        let seconds = left.sessions.iter().map(|it| it.session.elapsed_seconds()).sum::<f64>();
+        let is_long = seconds + left.cached_seconds >= MIN_LEFT_SECONDS;
+        if is_long && left.memory_bytes() <= MAX_LEFT_BYTES {
+            self.left.push(left);
+        }
+    }
+
     /// The picture that was left of the very same.
     pub(super) fn come_back(&mut self, request: &Request) -> Option<SuspendedPicture> {
         let found = self.left.iter().position(|left| left.request.is_resumed_by(request))?;
@@ -197,7 +222,7 @@ mod tests {
     use super::*;
     use crate::app::worker::tests::request;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::render::{Gi, Session, View};
+    use crate::render::{Gi, View};
     use crate::scene::{Medium, builtin};
 
     fn lit(sky_name: &str) -> Arc<Environment> {

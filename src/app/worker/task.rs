@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::inspection::Inspection;
 use super::preview::{InPlace, MAIN, MAX_GAP, PLAIN, Preview, gap_after};
 use super::request::Request;
-use super::session_cache::{Learned, SuspendedPicture};
+use super::session_cache::{Learned, SuspendedPicture, SuspendedSession};
 use super::sessions::Sessions;
 use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
@@ -175,14 +175,15 @@ impl<'a> PictureTask<'a> {
     /// The picture that was left, if it was this very one and not long ago, or a new one.
     fn begin_pictures(&mut self) -> Pictures<'a> {
         let request = Arc::clone(self.request());
-        if let Some(left) = self.sessions.kept.come_back(&request) {
+        if let Some(mut left) = self.sessions.kept.come_back(&request)
+            && let Some(sessions) = left.sessions.pop()
+        {
             (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
             self.inspection.curves[MAIN] = left.curve;
-            let lit = (self.sessions.world, self.sessions.environment);
-            let resume = |state| Session::resume(lit, state);
-            let mut cached = left.cached.map(|cached| cached.map(resume));
+            let (main, mut cached) =
+                sessions.resume((self.sessions.world, self.sessions.environment));
             cached.iter_mut().for_each(|it| self.sessions.take_up_training(&mut it.session));
-            let pictures = Pictures::new(resume(left.session), cached);
+            let pictures = Pictures::new(main, cached);
             // Before it goes on.
             self.publish(Activity::Rendering, &pictures);
             return pictures;
@@ -245,17 +246,13 @@ impl<'a> PictureTask<'a> {
         {
             self.sessions.keep_training(&mut cached.session);
         }
-        let mut left = SuspendedPicture {
-            request: Arc::clone(self.request()),
-            session: main.suspend(),
-            cached: cached.map(|cached| cached.map(Session::suspend)),
+        self.sessions.kept.leave(SuspendedPicture {
+            request: Arc::clone(&self.sessions.watch.request),
+            sessions: vec![SuspendedSession::of(main, cached)],
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.inspection.curves[MAIN]),
             cached_seconds: self.cached_seconds,
-        };
-        if left.is_worth_it() {
-            self.sessions.kept.left.push(left);
-        }
+        });
     }
 
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached
@@ -416,10 +413,10 @@ impl<'a> PictureTask<'a> {
         let cut_off = self.sessions.cut_off(main.samples());
         let trained = cached.as_ref().map_or(main, |cached| &cached.session);
         let kept = &mut *self.sessions.kept;
-            learning_step: None,
         kept.snapshots += 1;
         shared.publish(Snapshot {
             number: kept.snapshots,
+            learning_step: None,
             activity,
             main: main_snapshot,
             now: main.figures(),

@@ -8,8 +8,9 @@ use super::*;
 use crate::environment::{Environment, EnvironmentOptions, sky};
 use crate::path::World;
 use crate::render::gpu::DeviceChoice;
+use crate::render::light_groups::LightFactors;
 use crate::render::{StopRule, View};
-use crate::scene::builtin;
+use crate::scene::{LampEdits, builtin};
 
 /// What a window asks for that has just opened.
 pub(super) fn request(world: Arc<World>, environment: Arc<Environment>, size: [u32; 2]) -> Request {
@@ -36,8 +37,8 @@ pub(super) fn request(world: Arc<World>, environment: Arc<Environment>, size: [u
 pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot) -> Snapshot {
     Snapshot {
         number: main.figures.samples,
-        request: Arc::clone(request),
         learning_step: None,
+        request: Arc::clone(request),
         activity: Activity::Rendering,
         now: main.figures,
         main,
@@ -164,6 +165,27 @@ fn whoever_comes_back_sees_the_cached_light_that_there_was() {
     // It goes on.
     worker.submit(Request { environment: again, paused: false, ..paused });
     wait_for(&worker, |now| of_cache(now).is_some_and(|now| now.samples > cached.samples));
+}
+
+#[test]
+fn whoever_comes_back_to_a_light_mix_finds_the_pictures_of_all_its_groups() {
+    let Some(worker) = worker() else { return };
+    let lamp_edits = LampEdits::new();
+    let mix = Some(LightFactors { intensity: 1.0, sun: 1.0, lamps: 1.0, lamp_edits });
+    let request = Request { mix, ..request_of("evening", [160, 120]) };
+    worker.submit(request.clone());
+    wait_for(&worker, |now| now.main.samples > 1 && now.seconds() > 1.5);
+    let paused = Request { paused: true, ..request };
+    worker.submit(paused.clone());
+    let left = wait_for(&worker, |now| now.activity == Activity::Paused);
+    assert!(left.groups.len() > 2);
+    let mut moved = paused.clone();
+    moved.view.camera.world_from_camera.translation.x += 1.0;
+    worker.submit(moved.clone());
+    wait_for(&worker, |now| now.request.view == moved.view);
+    worker.submit(paused.clone());
+    let back = wait_for(&worker, |now| now.request.view == paused.view);
+    assert!(back.main.film == left.main.film, "the same picture");
 }
 
 #[test]
