@@ -67,7 +67,7 @@ struct Length {
 /// Where an object's data are.
 #[derive(Deserialize)]
 struct Named<'a> {
-    #[serde(borrow, default)]
+    #[serde(borrow)]
     uri: Option<&'a RawValue>,
 }
 

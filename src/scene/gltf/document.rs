@@ -44,7 +44,6 @@ pub(super) struct Document<'a> {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asset {
-    #[serde(default)]
     generator: Option<String>,
     version: Option<String>,
     min_version: Option<String>,

@@ -50,9 +50,7 @@ struct Hierarchy {
 /// What the hierarchy is made of.
 #[derive(Deserialize)]
 struct Below {
-    #[serde(default)]
     children: Option<Vec<Index<json::Node>>>,
-    #[serde(default)]
     skin: Option<Index<json::Skin>>,
 }
 
@@ -61,7 +59,6 @@ struct Below {
 pub(super) struct Tops {
     #[serde(default)]
     nodes: Vec<Index<json::Node>>,
-    #[serde(default)]
     pub(super) extras: json::Extras,
 }
 
