@@ -268,8 +268,9 @@ mod tests {
         for i in 0..SIDE * SIDE {
             let u = DVec2::new(f64::from(i % SIDE) + 0.5, f64::from(i / SIDE) + 0.5);
             if let Some(patch) = table.sample(&sky, u / f64::from(SIDE)) {
-                let index = (patch.y - sky.y.start) * sky.width() + patch.x - sky.x.start;
-                observed[index as usize] += 1.0 / f64::from(SIDE * SIDE);
+                let row = (patch.y - sky.y.start) as usize;
+                observed[row * sky.x.len() + (patch.x - sky.x.start) as usize] +=
+                    1.0 / f64::from(SIDE * SIDE);
             }
         }
         for (observed, expected) in observed.iter().zip(&expected) {

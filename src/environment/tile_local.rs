@@ -67,14 +67,14 @@ impl TileLocal {
         let tiles: Vec<TilePatches> =
             (0..grid.count()).map(|tile| grid.patches(tile).clone()).collect();
         let mut row_sums = zeros_on_huge_pages(tiles.iter().map(TilePatches::len).sum());
-        let mut tile_sums = vec![0; tiles.iter().map(|t| t.height() as usize).sum()];
+        let mut tile_sums = vec![0; tiles.iter().map(|tile| tile.y.len()).sum()];
         let mut energies = vec![0.0; tiles.len()];
 
         let (mut row_rest, mut tile_rest) = (&mut row_sums[..], &mut tile_sums[..]);
         let mut jobs = Vec::with_capacity(tiles.len());
         for (patches, energy) in tiles.into_iter().zip(&mut energies) {
             let row_part = row_rest.split_off_mut(..patches.len()).unwrap_or_default();
-            let tile_part = tile_rest.split_off_mut(..patches.height() as usize);
+            let tile_part = tile_rest.split_off_mut(..patches.y.len());
             jobs.push((patches, row_part, tile_part.unwrap_or_default(), energy));
         }
         jobs.into_par_iter().for_each_init(
@@ -82,12 +82,12 @@ impl TileLocal {
             |(tile_weights, scratch), (patches, row_sums, tile_sums, energy)| {
                 tile_weights.clear();
                 tile_weights.resize(patches.len(), 0.0);
-                let rows = tile_weights.chunks_exact_mut(patches.width() as usize);
+                let rows = tile_weights.chunks_exact_mut(patches.x.len());
                 for (row, y) in rows.zip(patches.y.clone()) {
                     weights.row(patches.x.start, y, row, scratch);
                 }
                 *energy = tile_weights.iter().sum();
-                quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
+                quantise(tile_weights, *energy, row_sums, tile_sums);
             },
         );
         let places = places(&tile_sums, grid);
@@ -202,13 +202,13 @@ fn places(tile_sums: &[u32], grid: &TileGrid) -> Vec<Place> {
     let (columns, _) = grid.size();
     let place = |tile: u32| {
         let patches = grid.patches(tile);
-        let [width, height] = [patches.width(), patches.height()];
         // Each tile of a row of them has as many rows as the others.
         let before = patches.y.start as usize * columns as usize;
-        let first_row = before + (tile % columns) as usize * height as usize;
-        let (corner, size) = ([patches.x.start, patches.y.start], [width, height]);
+        let first_row = before + (tile % columns) as usize * patches.y.len();
+        let corner = [patches.x.start, patches.y.start];
+        let size = [&patches.x, &patches.y].map(|range| range.len() as u32);
         let first_patch = grid.first_patch(patches);
-        let total = tile_sums[first_row + height as usize - 1];
+        let total = tile_sums[first_row + patches.y.len() - 1];
         Place { corner, size, first_row, first_patch, total }
     };
     (0..grid.count()).map(place).collect()
@@ -275,14 +275,14 @@ impl Target {
 }
 
 /// Rounds weights to integers, positive ones to at least 1, and computes their prefix sums.
-fn quantise(weights: &[f64], energy: f64, width: u32, row_sums: &mut [u32], tile_sums: &mut [u32]) {
+fn quantise(weights: &[f64], energy: f64, row_sums: &mut [u32], tile_sums: &mut [u32]) {
     if energy <= 0.0 {
         return; // Black: the sums are zero already.
     }
     // Raising to 1 adds at most one per patch; a second one covers the rounding of `energy`, which
     // is below 2^-53 per patch relative to a total below 2^32.
     let total_mass = f64::from(u32::MAX) - 2.0 * weights.len() as f64;
-    let width = width as usize;
+    let width = weights.len() / tile_sums.len();
     let mut tile_sum = 0_u32;
     for ((weights, sums), total) in
         weights.chunks_exact(width).zip(row_sums.chunks_exact_mut(width)).zip(tile_sums)
@@ -307,7 +307,7 @@ mod tests {
         for weights in [vec![1.0; 4096], vec![1e-300, 1e300, 0.0, 1e-300], vec![5e-324; 9]] {
             let (mut rows, mut totals) = (vec![0; weights.len()], vec![0]);
             let energy = weights.iter().sum();
-            quantise(&weights, energy, weights.len() as u32, &mut rows, &mut totals);
+            quantise(&weights, energy, &mut rows, &mut totals);
             let mut before = 0;
             for (sum, weight) in rows.iter().zip(&weights) {
                 assert_eq!(sum - before > 0, *weight > 0.0, "{before} -> {sum}");

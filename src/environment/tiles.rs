@@ -61,8 +61,7 @@ impl TileGrid {
 
     /// Where a tile's patches begin when tiles are stored one after another, row of tiles after row.
     pub(crate) fn first_patch(&self, patches: &TilePatches) -> usize {
-        patches.y.start as usize * self.width as usize
-            + patches.x.start as usize * patches.height() as usize
+        patches.y.start as usize * self.width as usize + patches.x.start as usize * patches.y.len()
     }
 
     /// Bytes the grid's look-up arrays take.
@@ -83,19 +82,9 @@ pub(crate) struct TilePatches {
 }
 
 impl TilePatches {
-    /// Patches per row.
-    pub(crate) fn width(&self) -> u32 {
-        self.x.end - self.x.start
-    }
-
-    /// Rows.
-    pub(crate) fn height(&self) -> u32 {
-        self.y.end - self.y.start
-    }
-
     /// Number of patches.
     pub(crate) fn len(&self) -> usize {
-        self.width() as usize * self.height() as usize
+        self.x.len() * self.y.len()
     }
 }
 
@@ -126,8 +115,8 @@ mod tests {
                 let t = grid.patches(tile);
                 assert_eq!(grid.first_patch(t), if tile == 0 { 0 } else { patches });
                 patches += t.len();
-                assert!(t.width().abs_diff(width / grid.size().0) <= 1);
-                assert!(t.height().abs_diff(height / grid.size().1) <= 1);
+                assert!(t.x.len().abs_diff((width / grid.size().0) as usize) <= 1);
+                assert!(t.y.len().abs_diff((height / grid.size().1) as usize) <= 1);
                 for y in t.y.clone() {
                     for x in t.x.clone() {
                         assert_eq!(grid.tile_of_patch(x, y), tile);
