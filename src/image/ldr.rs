@@ -103,18 +103,17 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     reader.limits(limits(MAX_SIDE, MAX_BYTES, file_bytes));
     let cause = |cause| decoder_cause(&cause, file_bytes);
     let decoded = guarded(|| reader.decode().map_err(cause)).at(name)?;
-    let (width, height) = (decoded.width(), decoded.height());
     let color = decoded.color();
     let channels = color.channel_count();
-    let pixels = match (channels, color.bytes_per_pixel() > channels) {
-        (1, false) => Texels::new(1, decoded.into_luma8().into_raw()),
-        (2, false) => Texels::new(2, decoded.into_luma_alpha8().into_raw()),
-        (3, false) => Texels::new(3, decoded.into_rgb8().into_raw()),
-        (_, false) => Texels::new(4, decoded.into_rgba8().into_raw()),
-        (1, true) => Texels::deep(1, &decoded.into_luma16()),
-        (2, true) => Texels::deep(2, &decoded.into_luma_alpha16()),
-        (3, true) => Texels::deep(3, &decoded.into_rgb16()),
-        (_, true) => Texels::deep(4, &decoded.into_rgba16()),
+    let pixels = match channels {
+        // Of 8 bits each.
+        _ if color.bytes_per_pixel() == channels => {
+            Texels::new(channels.into(), decoded.into_bytes())
+        }
+        1 => Texels::deep(1, &decoded.into_luma16()),
+        2 => Texels::deep(2, &decoded.into_luma_alpha16()),
+        3 => Texels::deep(3, &decoded.into_rgb16()),
+        _ => Texels::deep(4, &decoded.into_rgba16()),
     };
     Ok(LdrImage { width, height, pixels: pixels.without_opaque_alpha(), is_premultiplied: false })
 }
