@@ -29,7 +29,7 @@ impl Scene {
         }
         let mut is_backed = vec![false; self.triangles.len()];
         let faces = Faces { scene: self, is_sided: &is_sided };
-        for cut in [Faces::single, Faces::twos, Faces::runs] {
+        for cut in [Faces::of::<1>, Faces::of::<2>, Faces::runs] {
             let list = cut(&faces, &is_backed);
             let hash = |number: usize| faces.hash(&list[number]);
             let pairs = copies(list.len(), hash, |a, b| faces.are_opposite(&list[a], &list[b]));
@@ -70,17 +70,15 @@ struct Faces<'a> {
 }
 
 impl Faces<'_> {
-    fn single(&self, _: &[bool]) -> Vec<Range<usize>> {
-        let all = (0..self.scene.triangles.len()).filter(|&at| self.may_pair(at));
-        all.map(|at| at..at + 1).collect()
-    }
-
-    fn twos(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
+    /// All faces of so many triangles.
+    fn of<const COUNT: usize>(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
         let is_left = |at: usize| !is_backed[at] && self.may_pair(at);
-        let are_two =
-            |&at: &usize| is_left(at - 1) && is_left(at) && self.goes_on(&(at - 1..at), at);
-        let seconds = (1..self.scene.triangles.len()).into_par_iter().filter(are_two);
-        seconds.map(|at| at - 1..at + 1).collect()
+        let is_face = |face: &Range<usize>| {
+            face.clone().all(is_left)
+                && (face.start + 1..face.end).all(|at| self.goes_on(&(face.start..at), at))
+        };
+        let firsts = (0..self.scene.triangles.len().saturating_sub(COUNT - 1)).into_par_iter();
+        firsts.map(|at| at..at + COUNT).filter(is_face).collect()
     }
 
     fn runs(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
