@@ -129,8 +129,6 @@ struct Subtree {
 
 /// Writes a wide tree.
 struct Collapse<'a> {
-    items: &'a Items<'a>,
-    binary: &'a Bvh2,
     weighing: &'a Weighing<'a>,
     nodes: Vec<Node>,
     blocks: Vec<Block>,
@@ -142,19 +140,18 @@ struct Collapse<'a> {
 impl<'a> Collapse<'a> {
     fn new(weighing: &'a Weighing<'a>, levels: usize) -> Self {
         let (nodes, blocks, subtrees) = Default::default();
-        let &Weighing { items, binary, .. } = weighing;
-        Self { items, binary, weighing, nodes, blocks, levels, subtrees }
+        Self { weighing, nodes, blocks, levels, subtrees }
     }
 
     fn root(&mut self) {
-        let instance = self.items.instance_of(self.binary, 0);
+        let instance = self.weighing.instance_of(0);
         if instance.is_none() && !self.weighing.choices(0).is_block() {
             self.node(0, 0);
             return;
         }
         let reference = self.reserve();
         let child = instance.unwrap_or_else(|| self.block_of(0));
-        self.nodes[reference as usize].set_child(0, bounds(self.binary, 0), child);
+        self.nodes[reference as usize].set_child(0, bounds(self.weighing.binary, 0), child);
     }
 
     /// Emits the node that stands for the binary inner node `index`.
@@ -169,7 +166,7 @@ impl<'a> Collapse<'a> {
         self.sort_by_blocking(&mut children);
         let mut node = Node::EMPTY;
         for (lane, &child) in children.iter().enumerate() {
-            let target = if let Some(instance) = self.items.instance_of(self.binary, child) {
+            let target = if let Some(instance) = self.weighing.instance_of(child) {
                 instance
             } else if self.weighing.choices(child).is_block() {
                 self.block_of(child)
@@ -179,7 +176,7 @@ impl<'a> Collapse<'a> {
             } else {
                 self.node(child, depth + 1)
             };
-            node.set_child(lane, bounds(self.binary, child), target);
+            node.set_child(lane, bounds(self.weighing.binary, child), target);
         }
         self.nodes[reference as usize] = node;
         reference
@@ -189,7 +186,7 @@ impl<'a> Collapse<'a> {
     /// rather than nodes, and large ones rather than small (after Nah and Manocha, *SATO: Surface Area
     /// Traversal Order for Shadow Ray Tracing*, CGF 33(6), 2014).
     fn sort_by_blocking(&self, children: &mut [u32]) {
-        let half_area = |child: u32| self.binary.nodes[child as usize].aabb().half_area();
+        let half_area = |child: u32| self.weighing.binary.nodes[child as usize].aabb().half_area();
         let is_block = |child: u32| self.weighing.choices(child).is_block();
         children.sort_by(|&a, &b| {
             let triangles_last = is_block(a).cmp(&is_block(b));
@@ -199,7 +196,7 @@ impl<'a> Collapse<'a> {
 
     /// Collects the binary nodes that become the children of a wide node, by least cost.
     fn open(&self, index: u32, slots: usize, children: &mut Vec<u32>) {
-        let left = self.binary.nodes[index as usize].first_index;
+        let left = self.weighing.binary.nodes[index as usize].first_index;
         let of_left = self.weighing.choices(index).of_left(slots);
         for (child, slots) in [(left, of_left), (left + 1, slots - of_left)] {
             match self.weighing.choices(child).used(slots) {
@@ -217,15 +214,15 @@ impl<'a> Collapse<'a> {
     /// Emits a tree of least depth over `primitives`, in their order along the binary tree.
     fn balanced(&mut self, primitives: &[u32], depth: usize) -> ((Vec3, Vec3), Reference) {
         assert!(depth < MAX_DEPTH, "eight-way splits of a u32 count end within 12 levels");
-        let boxes = primitives.iter().map(|&primitive| self.items.aabb(primitive));
+        let boxes = primitives.iter().map(|&primitive| self.weighing.items.aabb(primitive));
         let all = boxes.reduce(|a, b| a.union(&b)).expect("some primitives");
         let bounds = (all.min.into(), all.max.into());
         if let [one] = primitives
-            && let Item::Instance(number) = self.items.get(*one)
+            && let Item::Instance(number) = self.weighing.items.get(*one)
         {
             return (bounds, INSTANCE | number);
         }
-        let is_triangle = |one: &u32| matches!(self.items.get(*one), Item::Triangle(_));
+        let is_triangle = |one: &u32| matches!(self.weighing.items.get(*one), Item::Triangle(_));
         if primitives.len() <= WIDTH && primitives.iter().all(is_triangle) {
             return (bounds, self.block(primitives));
         }
@@ -247,8 +244,8 @@ impl<'a> Collapse<'a> {
     fn block(&mut self, primitives: &[u32]) -> Reference {
         let mut block = Block::EMPTY;
         for (lane, &primitive) in primitives.iter().enumerate() {
-            let triangle = self.items.triangles[primitive as usize];
-            block.set_triangle(lane, self.items.sources.vertices(triangle), triangle);
+            let triangle = self.weighing.items.triangles[primitive as usize];
+            block.set_triangle(lane, self.weighing.items.sources.vertices(triangle), triangle);
         }
         self.blocks.push(block);
         Reference::try_from(self.blocks.len() - 1).expect("fewer blocks than triangles") | LEAF
@@ -259,11 +256,11 @@ impl<'a> Collapse<'a> {
         let mut primitives = Vec::new();
         let mut stack = vec![index];
         while let Some(index) = stack.pop() {
-            let node = &self.binary.nodes[index as usize];
+            let node = &self.weighing.binary.nodes[index as usize];
             let first = node.first_index as usize;
             if node.is_leaf() {
                 let range = first..first + node.prim_count as usize;
-                primitives.extend_from_slice(&self.binary.primitive_indices[range]);
+                primitives.extend_from_slice(&self.weighing.binary.primitive_indices[range]);
             } else {
                 stack.extend([node.first_index + 1, node.first_index]);
             }

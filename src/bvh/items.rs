@@ -10,7 +10,6 @@ use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use rayon::prelude::*;
 
 use super::instance::Placed;
-use super::wide::{INSTANCE, Reference};
 use crate::sampler::{hash, unit_from_bits};
 
 /// What a tree is built over: triangles that have an area, then instances. These are the primitives of
@@ -44,18 +43,6 @@ impl<'a> Items<'a> {
         match self.triangles.get(primitive as usize) {
             Some(&triangle) => Item::Triangle(triangle),
             None => Item::Instance(self.instances[primitive as usize - self.triangles.len()]),
-        }
-    }
-
-    /// Reference to the instance that a node of the binary tree is, if it is one.
-    pub(super) fn instance_of(&self, binary: &Bvh2, node: u32) -> Option<Reference> {
-        let node = &binary.nodes[node as usize];
-        if !node.is_leaf() {
-            return None;
-        }
-        match self.get(binary.primitive_indices[node.first_index as usize]) {
-            Item::Instance(number) => Some(INSTANCE | number),
-            Item::Triangle(_) => None,
         }
     }
 

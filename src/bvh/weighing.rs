@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::items::Items;
-use super::wide::WIDTH;
+use super::items::{Item, Items};
+use super::wide::{INSTANCE, Reference, WIDTH};
 
 /// Cost of testing one block of triangles, relative to one node.
 const BLOCK_COST: f32 = 1.5;
@@ -85,6 +85,18 @@ impl<'a> Weighing<'a> {
         Choices(self.choices[index as usize].load(Ordering::Relaxed))
     }
 
+    /// Reference to the instance that a node is, if it is one.
+    pub(super) fn instance_of(&self, node: u32) -> Option<Reference> {
+        let node = &self.binary.nodes[node as usize];
+        if !node.is_leaf() {
+            return None;
+        }
+        match self.items.get(self.binary.primitive_indices[node.first_index as usize]) {
+            Item::Instance(number) => Some(INSTANCE | number),
+            Item::Triangle(_) => None,
+        }
+    }
+
     /// Costs of the subtree of a node at a level.
     fn costs(&self, index: u32, level: usize) -> SubtreeCosts {
         let Some([left, right]) = self.children(index) else { return self.of_leaf(index) };
@@ -121,7 +133,7 @@ impl<'a> Weighing<'a> {
     fn of_leaf(&self, index: u32) -> SubtreeCosts {
         let node = &self.binary.nodes[index as usize];
         let area = node.aabb().half_area();
-        if self.items.instance_of(self.binary, index).is_some() {
+        if self.instance_of(index).is_some() {
             self.choices[index as usize].store(Choices::OF_INSTANCE.0, Ordering::Relaxed);
             // Too many for a block.
             SubtreeCosts { forest: [area * INSTANCE_COST; WIDTH - 1], count: WIDTH as u32 + 1 }
