@@ -70,11 +70,9 @@ impl Scene {
 
     /// How many triangles are shown, those of instances counted one by one.
     pub fn shown_triangles(&self) -> u64 {
-        let instances = &self.instances;
-        let of_mesh = |mesh: u32| instances.meshes()[mesh as usize].len() as u64;
-        let shared: u64 = instances.meshes().iter().map(|mesh| mesh.len() as u64).sum();
-        let shown: u64 = instances.iter().map(|instance| of_mesh(instance.mesh)).sum();
-        self.triangles.len() as u64 - shared + shown
+        let meshes = self.instances.meshes();
+        let instances = self.instances.iter().map(|instance| meshes[instance.mesh as usize].len());
+        (self.own_triangles().len() + instances.sum::<usize>()) as u64
     }
 
     /// Index of the camera of this name or, if none has it, of this number, counted from 0.

@@ -116,12 +116,11 @@ impl Instances {
 
     /// As the tree wants them.
     pub(crate) fn for_tree(&self) -> Vec<bvh::Instance> {
-        let mesh_start = |mesh: u32| self.meshes[mesh as usize].start;
         let all = self.all.iter().zip(&self.shifts);
         all.map(|(&Instance { mesh, placing }, shift)| bvh::Instance {
             mesh,
             world_from_mesh: placing.affine(),
-            first: mesh_start(mesh).wrapping_add(*shift),
+            first: self.meshes[mesh as usize].start.wrapping_add(*shift),
         })
         .collect()
     }
