@@ -116,8 +116,7 @@ pub(crate) fn is_scene(name: &str) -> bool {
 /// # Errors
 /// One sentence: the name is neither a file nor a built-in's.
 pub fn check_scene(name: &str) -> Result<()> {
-    let exists = is_built_in_scene(name) || Path::new(name).exists();
-    match exists {
+    match is_built_in_scene(name) || Path::new(name).exists() {
         true => Ok(()),
         false if is_built_in_map(name) => {
             Err(Error::new(format!("{name}: is a sky, which a scene gets by --env")))
@@ -148,20 +147,16 @@ pub fn check_map(name: &str) -> Result<()> {
 /// One sentence: there is no such sky, its size is out of range, or the file cannot be read.
 pub fn map(name: &str) -> Result<(Image, Notices)> {
     if let Some(rest) = name.strip_prefix("sky:") {
-        return Ok((built_in_sky(name, rest)?, Notices::default()));
+        let (sky_name, (width, height)) = sky_and_size(name, rest)?;
+        memory::check(2 * u64::from(width) * u64::from(height) * size_of::<[f32; 3]>() as u64)
+            .at(name)?;
+        return Ok((sky::build(sky_name, width, height)?, Notices::default()));
     }
     let loaded = read_map(Path::new(name))?;
     // The tables made of it take as much again.
     let bytes = loaded.image.pixels.len() * size_of::<[f32; 3]>();
     memory::check(bytes as u64).at(name)?;
     Ok((loaded.image, loaded.notices))
-}
-
-fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
-    let (sky_name, (width, height)) = sky_and_size(name, rest)?;
-    memory::check(2 * u64::from(width) * u64::from(height) * size_of::<[f32; 3]>() as u64)
-        .at(name)?;
-    sky::build(sky_name, width, height)
 }
 
 /// Name and size of the sky that `rest` asks for.
