@@ -23,8 +23,8 @@ pub(super) struct File<'a> {
     pub(super) folder: Folder<'a>,
     /// The binary chunk of a GLB.
     binary: Option<&'a [u8]>,
-    /// What has been read so far: each buffer when it is used first, each file once.
-    buffers: Slots<Buffer>,
+    /// What has been read so far: each buffer that has a URI when it is used first, each file once.
+    buffers: Slots<Option<Arc<Vec<u8>>>>,
     files: Mutex<BTreeMap<PathBuf, Arc<Vec<u8>>>>,
     /// Buffer views that were packed.
     unpacked: Slots<Vec<u8>>,
@@ -47,14 +47,6 @@ impl<T> Slots<T> {
         let slots = self.0.get_or_init(|| (0..count).map(|_| OnceLock::new()).collect());
         slots[index].get_or_init(|| Box::new(make())).as_ref().as_ref()
     }
-}
-
-/// A buffer that was read.
-struct Buffer {
-    promised: u64,
-    /// Its URI, as it is shown.
-    name: Option<String>,
-    bytes: Arc<Vec<u8>>,
 }
 
 /// What a buffer promises, if it does.
@@ -118,28 +110,27 @@ impl<'a> File<'a> {
     fn buffer(&self, index: Index<json::Buffer>) -> Fallible<&[u8]> {
         let text = self.document.buffers.text(index)?;
         let count = self.document.buffers.len();
+        let named = |cause: String| format!("buffer {index}: {cause}");
         let read = || {
-            let length: Length = self.document.buffers.get_as(index)?;
-            let uri = uri_of(text)?;
-            let bytes = uri.as_deref().map(|uri| self.read(uri)).transpose()?.unwrap_or_default();
-            let name = uri.as_deref().map(uri::shown);
+            let length: Length = self.document.buffers.get_as(index).map_err(named)?;
+            let Some(uri) = uri_of(text).map_err(named)? else { return Ok(None) };
+            let bytes = self.read(&uri).map_err(named)?;
             let promised = length.byte_length.map_or(0, |length| length.0);
-            Ok(Buffer { promised, name, bytes })
+            if (bytes.len() as u64) < promised {
+                return Err(format!(
+                    "buffer {index} ({}) is cut off: {promised} bytes are promised and there are {}",
+                    uri::shown(&uri),
+                    bytes.len()
+                ));
+            }
+            Ok(Some(bytes))
         };
-        let buffer = self.buffers.get(index.value(), count, read);
-        let Buffer { promised, name, bytes } =
-            buffer.map_err(|cause| format!("buffer {index}: {cause}"))?;
-        let Some(name) = name else {
+        match self.buffers.get(index.value(), count, read) {
+            Ok(Some(bytes)) => Ok(bytes),
             // Without a URI, and not first, it is a placeholder that only an extension fills.
-            return Ok(self.binary.filter(|_| index.value() == 0).unwrap_or_default());
-        };
-        if (bytes.len() as u64) < *promised {
-            return Err(format!(
-                "buffer {index} ({name}) is cut off: {promised} bytes are promised and there are {}",
-                bytes.len()
-            ));
+            Ok(None) => Ok(self.binary.filter(|_| index.value() == 0).unwrap_or_default()),
+            Err(cause) => Err(cause.clone()),
         }
-        Ok(bytes)
     }
 
     /// The bytes of a URI; those of a file are read once, however many name it.
