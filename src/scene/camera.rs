@@ -61,12 +61,10 @@ impl CameraPlace {
     pub fn camera(&self, frame: Frame) -> Camera {
         let (eye, target) = (frame.point(self.eye), frame.point(self.target));
         let up = self.up.map_or_else(|| Camera::usual_up(eye - target), |up| up.as_vec3());
-        let projection = match self.projection {
-            Projection::Orthographic { half_height } => {
-                Projection::Orthographic { half_height: frame.length(half_height) }
-            }
-            perspective => perspective,
-        };
+        let mut projection = self.projection;
+        if let Projection::Orthographic { half_height } = &mut projection {
+            *half_height = frame.length(*half_height);
+        }
         Camera { projection, ..Camera::facing(eye, target, up, 1.0) }
     }
 }
