@@ -12,6 +12,7 @@
 
 use glam::{DVec3, Vec3};
 use gltf::json;
+use serde::Deserialize as _;
 use serde_json::{Map, Value};
 
 use super::document::Document;
@@ -76,15 +77,9 @@ fn understood(keys: &Map<String, Value>) -> Option<Medium> {
     let coefficient = |key: &str| match keys.get(key) {
         None => Some(Vec3::ZERO),
         Some(Value::Number(number)) => Some(Vec3::splat(number.as_f64()? as f32)),
-        Some(value) => vector(value),
+        Some(value) => Vec3::deserialize(value).ok(),
     };
-    let bounds = match keys.get("box").map(Value::as_array) {
-        None => None,
-        Some(corners) => {
-            let [low, high] = corners?.as_slice() else { return None };
-            Some([vector(low)?, vector(high)?])
-        }
-    };
+    let bounds = keys.get("box").map(<[Vec3; 2]>::deserialize).transpose().ok()?;
     let medium = Medium {
         scattering: coefficient("scattering")?,
         absorption: coefficient("absorption")?,
@@ -92,10 +87,4 @@ fn understood(keys: &Map<String, Value>) -> Option<Medium> {
         bounds,
     };
     medium.is_sound().then_some(medium)
-}
-
-fn vector(value: &Value) -> Option<Vec3> {
-    let numbers: Vec<f32> =
-        value.as_array()?.iter().map(|x| x.as_f64().map(|x| x as f32)).collect::<Option<_>>()?;
-    <[f32; 3]>::try_from(numbers).ok().map(Vec3::from)
 }
