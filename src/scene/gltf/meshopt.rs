@@ -6,7 +6,6 @@ mod packed;
 
 use gltf::json;
 use serde::Deserialize as _;
-use serde_json::Value;
 
 use super::limits::Fallible;
 use crate::memory;
@@ -19,14 +18,11 @@ const MAX_BYTE_VALUES: u64 = 1100;
 impl Packed {
     /// What is packed in a view; `None` if it is a plain one.
     pub(super) fn of(view: &json::buffer::View) -> Fallible<Option<Self>> {
-        let Some(extensions) = &view.extensions else { return Ok(None) };
         let names = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
-        let Some(extension) = names.iter().find_map(|name| extensions.others.get(*name)) else {
-            return Ok(None);
-        };
-        Self::deserialize(extension as &Value)
-            .map(Some)
-            .map_err(|cause| format!("its meshopt compression makes no sense ({cause})"))
+        let others = view.extensions.as_ref().map(|all| &all.others);
+        let extension = names.iter().find_map(|name| others?.get(*name));
+        let packed = extension.map(Self::deserialize).transpose();
+        packed.map_err(|cause| format!("its meshopt compression makes no sense ({cause})"))
     }
 
     /// Unpacks the bytes.
