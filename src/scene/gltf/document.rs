@@ -116,12 +116,10 @@ fn check_version(asset: Option<&str>) -> Fallible<Option<String>> {
     if version.split('.').next() != Some("2") {
         return Err(format!("it is glTF version {version}; only 2.0 can be read"));
     }
-    match asset.min_version.as_deref() {
-        Some(least) if least != "2.0" => {
-            Err(format!("it needs a reader for glTF {least}; only 2.0 can be read"))
-        }
-        _ => Ok(asset.generator),
+    if let Some(least) = asset.min_version.filter(|least| least != "2.0") {
+        return Err(format!("it needs a reader for glTF {least}; only 2.0 can be read"));
     }
+    Ok(asset.generator)
 }
 
 /// Splits a GLB into its JSON and binary chunks; chunks of other types are passed over.
