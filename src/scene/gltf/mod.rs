@@ -208,9 +208,8 @@ fn read_in(
     scene.pair_backs();
     scene.part_flush_faces();
     scene.notices = notices;
-    let found = file.folder.found.lock().unwrap_or_else(PoisonError::into_inner);
-    scene.files = found.iter().cloned().collect();
-    drop(found);
+    let found = file.folder.found.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    scene.files = found.into_iter().collect();
     Ok(scene)
 }
 
