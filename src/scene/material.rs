@@ -212,8 +212,6 @@ impl Material {
     pub(crate) fn may_be_polished(&self) -> bool {
         let may_be_narrow =
             |roughness: f32, slot| roughness < MAX_POLISH_ROUGHNESS || self.texture(slot).is_some();
-        let may_be_opaque =
-            |transmission: f32, slot| transmission == 0.0 || self.texture(slot).is_some();
         let is_coated = self.clearcoat > 0.0;
         let is_pure_metal = self.metallic == 1.0
             && self.texture(TextureSlot::MetallicRoughness).is_none()
@@ -223,10 +221,16 @@ impl Material {
             && may_be_narrow(self.roughness, TextureSlot::MetallicRoughness)
             || is_coated
                 && may_be_narrow(self.clearcoat_roughness, TextureSlot::ClearcoatRoughness);
-        !self.unlit
-            && is_polished
-            && may_be_opaque(self.transmission, TextureSlot::Transmission)
-            && may_be_opaque(self.diffuse_transmission, TextureSlot::DiffuseTransmission)
+        !self.unlit && is_polished && self.may_be_opaque()
+    }
+
+    /// Whether it lets no light through somewhere.
+    pub(super) fn may_be_opaque(&self) -> bool {
+        let factors = [
+            (self.transmission, TextureSlot::Transmission),
+            (self.diffuse_transmission, TextureSlot::DiffuseTransmission),
+        ];
+        factors.into_iter().all(|(factor, slot)| factor <= 0.0 || self.texture(slot).is_some())
     }
 
     /// Whether as much light goes straight through as through another one with the same textures, and as much

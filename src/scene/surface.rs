@@ -317,14 +317,7 @@ impl<'a> SurfacePoint<'a> {
 
 /// Whether any triangle of a scene stands for a smooth shape ([`SurfacePoint::lift`]).
 pub(crate) fn lifts(scene: &Scene) -> bool {
-    let may_be_opaque = |m: &Material| {
-        let factors = [
-            (m.transmission, Slot::Transmission),
-            (m.diffuse_transmission, Slot::DiffuseTransmission),
-        ];
-        factors.into_iter().all(|(factor, slot)| factor <= 0.0 || m.texture(slot).is_some())
-    };
-    let is_opaque: Vec<bool> = scene.materials.iter().map(may_be_opaque).collect();
+    let is_opaque: Vec<bool> = scene.materials.iter().map(Material::may_be_opaque).collect();
     let is_lifted = |place: usize| {
         let vertices = scene.triangles[place].map(|i| i as usize);
         let [a, b, c] = vertices.map(|i| scene.positions[i]);
