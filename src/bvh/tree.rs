@@ -28,6 +28,23 @@ impl Simd {
     }
 }
 
+/// Calls one of the walks by the instructions that there are and by whether there are instances.
+macro_rules! walk {
+    ($walk:ident, $bvh:ident, $($argument:ident),+) => {{
+        let Bvh { tree, simd } = $bvh;
+        match (simd, tree.placed.is_empty()) {
+            (Simd::Portable, true) => traverse::$walk::<Portable, 1>(tree, $($argument),+),
+            (Simd::Portable, false) => traverse::$walk::<Portable, 2>(tree, $($argument),+),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            (Simd::Avx2, true) => unsafe { avx2::$walk::<1>(tree, $($argument),+) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            (Simd::Avx2, false) => unsafe { avx2::$walk::<2>(tree, $($argument),+) },
+        }
+    }};
+}
+
 /// Bounding volume hierarchy over the triangles of a scene.
 #[derive(Debug, Clone)]
 pub struct Bvh {
@@ -62,17 +79,7 @@ impl Bvh {
     /// Triangles have no back side: culling, like alpha masks, is up to `accept`.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        let Self { tree, simd } = self;
-        match (simd, tree.placed.is_empty()) {
-            (Simd::Portable, true) => traverse::closest_hit::<Portable, 1>(tree, ray, accept),
-            (Simd::Portable, false) => traverse::closest_hit::<Portable, 2>(tree, ray, accept),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            (Simd::Avx2, true) => unsafe { avx2::closest_hit::<1>(tree, ray, accept) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            (Simd::Avx2, false) => unsafe { avx2::closest_hit::<2>(tree, ray, accept) },
-        }
+        walk!(closest_hit, self, ray, accept)
     }
 
     /// Whether some hit blocks the ray.
@@ -80,17 +87,7 @@ impl Bvh {
     /// Every hit is offered to `blocks` exactly once, in no particular order, until it returns true.
     #[inline]
     pub fn any_hit(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
-        let Self { tree, simd } = self;
-        match (simd, tree.placed.is_empty()) {
-            (Simd::Portable, true) => traverse::any_hit::<Portable, 1>(tree, ray, blocks),
-            (Simd::Portable, false) => traverse::any_hit::<Portable, 2>(tree, ray, blocks),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            (Simd::Avx2, true) => unsafe { avx2::any_hit::<1>(tree, ray, blocks) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            (Simd::Avx2, false) => unsafe { avx2::any_hit::<2>(tree, ray, blocks) },
-        }
+        walk!(any_hit, self, ray, blocks)
     }
 
     /// Lower and upper corner of the box around all triangles (for instances, around boxes of parts
