@@ -1,6 +1,6 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, ErrorFilter, Features, Instance, InstanceDescriptor};
@@ -84,7 +84,8 @@ pub struct Gpu {
     pub(crate) limits: Limits,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    trouble: Arc<Mutex<Option<String>>>,
+    /// The first thing that went wrong.
+    trouble: Arc<OnceLock<String>>,
     /// Held by whoever submits, and alone by whoever needs a device with nothing to do.
     submitting: Arc<RwLock<()>>,
     /// Whether frames of a window are drawn on it too.
@@ -205,23 +206,18 @@ impl Gpu {
             ..wgpu::DeviceDescriptor::default()
         }))
         .map_err(|e| Error::new(format!("{} cannot be opened: {e}", facts.name)))?;
-        let trouble = Arc::new(Mutex::new(None));
-        let note = |trouble: &Arc<Mutex<Option<String>>>, sentence: String| {
-            if let Ok(mut first) = trouble.lock() {
-                first.get_or_insert(sentence);
-            }
-        };
+        let trouble = Arc::new(OnceLock::new());
         let (lost, failed) = (Arc::clone(&trouble), Arc::clone(&trouble));
         device.set_device_lost_callback(move |_, message| {
             let cause = one_line(&message);
             let cause = if cause.is_empty() { cause } else { format!(": {cause}") };
-            note(&lost, format!("the device was lost{cause}"));
+            let _ = lost.set(format!("the device was lost{cause}"));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             let sentence = sentence(&error);
             // Of a surface that could be better, which is as it was and will be configured again.
             if !sentence.contains(SURFACE_IS_BUSY) {
-                note(&failed, sentence);
+                let _ = failed.set(sentence);
             }
         }));
         let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MAX_STORAGE_BUFFERS;
@@ -295,9 +291,8 @@ impl Gpu {
     /// # Errors
     /// One sentence with the adapter's name.
     pub fn check(&self) -> Result<()> {
-        let unknown = |_| Some("its state is unknown".to_owned());
-        let trouble = self.trouble.lock().map_or_else(unknown, |trouble| trouble.clone());
-        trouble.map_or(Ok(()), |t| Err(Error::new(format!("{}: {t}", self.facts.name))))
+        let named = |trouble| Err(Error::new(format!("{}: {trouble}", self.facts.name)));
+        self.trouble.get().map_or(Ok(()), named)
     }
 
     /// Makes something on the device. What it has no room for, or will not take, is an error of that alone: the
