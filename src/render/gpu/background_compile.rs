@@ -27,26 +27,26 @@ impl Gpu {
     ) -> Result<MaybeReady<Vec<Arc<Pipeline>>>> {
         let sources: Vec<_> = programs.iter().map(|(_, program)| program.source.clone()).collect();
         let mut known = self.kernel_cache();
-        if let Some((_, error)) = known.ahead.refused.take_if(|(of, _)| *of == sources) {
+        if let Some((_, error)) = known.refused.take_if(|(of, _)| *of == sources) {
             return Err(error);
         }
         let found: Option<Vec<_>> = sources.iter().map(|source| known.find(source)).collect();
         if let Some(found) = found {
             return Ok(MaybeReady::Ready(found));
         }
-        if let Some(held) = known.ahead.holder_of(&sources) {
+        if let Some(held) = known.holder_of(&sources) {
             return Ok(MaybeReady::CompileGuard(held));
         }
         let (gpu, held) = (self.clone(), until_then());
         let holder = Arc::downgrade(&held);
-        known.ahead.under_way.push((sources.clone(), Weak::clone(&holder)));
+        known.under_way.push((sources.clone(), Weak::clone(&holder)));
         drop(known);
         let compile = move || {
             // What is said of a panic is on the terminal.
             let failed = |_| Err(Error::new("a kernel cannot be compiled"));
             let compiled = catch_unwind(AssertUnwindSafe(|| gpu.pipelines(programs)));
             if let Err(error) = compiled.unwrap_or_else(failed) {
-                gpu.kernel_cache().ahead.refused = Some((sources, error));
+                gpu.kernel_cache().refused = Some((sources, error));
             }
             // Nobody is told before it can be found, nor when the device may have gone with the process.
             drop(gpu);

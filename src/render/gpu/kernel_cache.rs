@@ -19,12 +19,15 @@ pub(super) struct Pipeline {
 /// or so where software runs it.
 pub(super) const MAX_KEPT_KERNELS: usize = 32;
 
-/// Kernels that were compiled.
+/// Kernels that were compiled, and those that are to be compiled ahead.
 #[derive(Default)]
 pub(super) struct KernelCache {
     /// The last one used at the end.
     kept: Vec<Arc<Pipeline>>,
-    pub(super) ahead: Ahead,
+    /// The sources that threads compile, and what those hold.
+    pub(super) under_way: Vec<(Vec<String>, Weak<CompileGuard>)>,
+    /// Sources that were refused last, and why.
+    pub(super) refused: Option<(Vec<String>, Error)>,
 }
 
 impl KernelCache {
@@ -47,21 +50,7 @@ impl KernelCache {
         }
         self.kept.push(pipeline);
     }
-}
 
-/// What is held for as long as a thread compiles.
-pub(crate) type CompileGuard = dyn Any + Send + Sync;
-
-/// Kernels that are to be compiled ahead.
-#[derive(Default)]
-pub(super) struct Ahead {
-    /// The sources that threads compile, and what those hold.
-    pub(super) under_way: Vec<(Vec<String>, Weak<CompileGuard>)>,
-    /// Sources that were refused last, and why.
-    pub(super) refused: Option<(Vec<String>, Error)>,
-}
-
-impl Ahead {
     /// What the thread holds that compiles these, maybe among others, if there is one.
     pub(super) fn holder_of(&mut self, sources: &[String]) -> Option<Weak<CompileGuard>> {
         self.under_way.retain(|(_, held)| held.strong_count() > 0);
@@ -70,3 +59,6 @@ impl Ahead {
         found.map(|(_, held)| Weak::clone(held))
     }
 }
+
+/// What is held for as long as a thread compiles.
+pub(crate) type CompileGuard = dyn Any + Send + Sync;
