@@ -234,7 +234,7 @@ impl Job<'_> {
         let films = Films { film, cached, denoised: None, groups: &sums.groups };
         let mut failures = outputs::write(&arguments, assignment, driver, &record, films);
         // Another device may have taken over.
-        assignment.metadata = record.metadata();
+        assignment.facts.metadata = record.metadata();
         failures.extend(assignment.keep(driver).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
@@ -267,7 +267,7 @@ impl Job<'_> {
         let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &driver.session, (&nothing, &not_yet, 0.0), notices);
-        assignment.metadata = record.metadata();
+        assignment.facts.metadata = record.metadata();
         let mut cpu = TakeOver { choice: arguments.device, notices };
         let begun = counted.map_or(Ok(()), |counted| {
             let taken_up = driver.session.continue_learning(counted);

@@ -24,24 +24,18 @@ use crate::sources;
 
 /// What one process renders of a picture.
 pub(super) struct RenderJob {
-    part: Part,
+    /// What its films are of, but for figures: as metadata checkpoints hold what their pictures say about themselves.
+    /// The target is the one that the checkpoint had.
+    pub(super) facts: FilmFacts,
     /// Samples a pixel before those of this part.
     first: u32,
     /// When this part is done; samples are counted from the picture's first.
     rule: StopRule,
-    /// Samples of the whole picture.
-    samples: Option<u32>,
     /// What a session is to go on from.
     awaited: Option<Awaited>,
-    /// Samples a pixel that the pass under way was to reach when the checkpoint was written.
-    target: u32,
     checkpoint: Option<Checkpoint>,
     /// Whether what was learned is wanted for its own sake.
     wants_distributions: bool,
-    /// See [`FilmFacts::picture`].
-    picture: Vec<(String, String)>,
-    /// What checkpoints hold as [`FilmFacts::metadata`]: what their pictures say about themselves.
-    pub(super) metadata: Vec<(String, String)>,
 }
 
 struct Checkpoint {
@@ -72,18 +66,23 @@ impl RenderJob {
                 part.number, part.count
             )));
         }
-        let mut assignment = Self {
-            part,
-            first: range.start,
-            rule: StopRule { samples: rule.samples.map(|_| range.end), ..rule },
-            samples: rule.samples,
-            awaited: None,
-            target: 0,
-            checkpoint: None,
-            wants_distributions: arguments.distributions.is_some(),
+        let facts = FilmFacts {
             // It takes a look at all of the scene and the map.
             picture: if is_kept { identity(arguments, lit, view) } else { Vec::new() },
+            part,
+            samples: rule.samples,
+            target: 0,
+            figures: Figures::default(),
             metadata: Vec::new(),
+            noted: Doubling::default(),
+        };
+        let mut assignment = Self {
+            facts,
+            first: range.start,
+            rule: StopRule { samples: rule.samples.map(|_| range.end), ..rule },
+            awaited: None,
+            checkpoint: None,
+            wants_distributions: arguments.distributions.is_some(),
         };
         if let Some(path) = &arguments.checkpoint {
             if path.exists() {
@@ -104,21 +103,21 @@ impl RenderJob {
     fn take_up(&mut self, path: &Path, view: &View) -> Result<()> {
         let (facts, film) = read_film(path)?;
         let advice = "remove it or name another";
-        if let Some(difference) = facts.difference(&self.picture) {
+        if let Some(difference) = facts.difference(&self.facts.picture) {
             let cause = format!(
                 "is the checkpoint of another picture, which differs in {difference}: {advice}"
             );
             return Err(Error::at(path, cause));
         }
-        let is_of_part =
-            facts.part == self.part && (self.part == Part::WHOLE || facts.samples == self.samples);
+        let FilmFacts { part, samples, .. } = self.facts;
+        let is_of_part = facts.part == part && (part == Part::WHOLE || facts.samples == samples);
         let is_alike = (film.width, film.height) == (view.width, view.height)
             && film.has_layers() == view.layers;
         if !is_of_part || !is_alike {
             let cause = format!("is the checkpoint of {}: {advice}", facts.share());
             return Err(Error::at(path, cause));
         }
-        self.target = facts.target;
+        self.facts.target = facts.target;
         self.awaited = Some(self.awaited(film, Some(facts.figures), facts.noted));
         Ok(())
     }
@@ -142,10 +141,10 @@ impl RenderJob {
     pub(super) fn driver<'a>(&mut self, session: Session<'a>) -> Driver<'a> {
         let is_kept = self.checkpoint.is_some();
         // Parts and checkpoints want whole samples.
-        let is_hasty = self.rule.seconds.is_some() && self.part == Part::WHOLE && !is_kept;
+        let is_hasty = self.rule.seconds.is_some() && self.facts.part == Part::WHOLE && !is_kept;
         let mut driver = Driver::new(session, self.rule);
         (driver.is_hasty, driver.is_resumable) = (is_hasty, is_kept);
-        (driver.target, driver.skipped) = (self.target, self.first);
+        (driver.target, driver.skipped) = (self.facts.target, self.first);
         driver.awaited = self.awaited.take();
         driver
     }
@@ -196,10 +195,10 @@ impl RenderJob {
     /// # Errors
     /// If it cannot be written; the one from before is kept.
     pub(super) fn keep(&mut self, driver: &Driver<'_>) -> Result<()> {
-        let session = &driver.session;
-        let facts = self.facts(driver.target, session.figures(), self.metadata.clone());
-        let facts = FilmFacts { noted: session.noted(), ..facts };
         let Some(checkpoint) = &mut self.checkpoint else { return Ok(()) };
+        let session = &driver.session;
+        let (target, figures, noted) = (driver.target, session.figures(), session.noted());
+        let facts = FilmFacts { target, figures, noted, ..self.facts.clone() };
         let written = write_film(&checkpoint.path, &facts, session.film(), self.first);
         checkpoint.written = Instant::now();
         written
@@ -221,19 +220,9 @@ impl RenderJob {
             figures.distribution_seconds = 0.0;
             figures.render_seconds = 0.0;
         }
-        write_film(path, &self.facts(driver.target, figures, record.metadata()), record.film, 0)
-    }
-
-    fn facts(&self, target: u32, figures: Figures, metadata: Vec<(String, String)>) -> FilmFacts {
-        FilmFacts {
-            picture: self.picture.clone(),
-            part: self.part,
-            samples: self.samples,
-            target,
-            figures,
-            metadata,
-            noted: Doubling::default(),
-        }
+        let (target, metadata) = (driver.target, record.metadata());
+        let facts = FilmFacts { target, figures, metadata, ..self.facts.clone() };
+        write_film(path, &facts, record.film, 0)
     }
 }
 
