@@ -22,7 +22,7 @@ pub(super) struct PictureArguments {
     tonemap: ToneCurve,
     /// Look over .png pictures: a .cube file over sRGB colours, or look:punchy, soft, warm, cool, night,
     /// black-and-white.
-    #[arg(long, value_parser = parse_look, value_name = "FILE|look:NAME", help_heading = "Picture")]
+    #[arg(long, value_parser = Lut::read, value_name = "FILE|look:NAME", help_heading = "Picture")]
     look: Option<Lut>,
     /// Share of the look, from 0 to 1.
     #[arg(long, default_value_t = 1.0, requires = "look", value_parser = parse_strength, value_name = "SHARE", help_heading = "Picture")]
@@ -63,10 +63,6 @@ pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String
     }
     let stops = values::finite(text).map_err(|e| format!("{e} of stops, or auto"))?;
     Ok(Exposure::Stops(stops as f32))
-}
-
-fn parse_look(text: &str) -> std::result::Result<Lut, String> {
-    Lut::read(text).map_err(|error| error.to_string())
 }
 
 fn parse_strength(text: &str) -> std::result::Result<f32, String> {
