@@ -35,7 +35,7 @@ pub struct DeviceFigures {
 }
 
 /// Figures of a scene on a device.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct SceneFigures {
     /// The scene's name.
     pub scene: String,

@@ -84,9 +84,7 @@ impl Place<'_> {
         let mut figures = SceneFigures {
             scene: self.subject.name.clone(),
             triangles: self.subject.world.scene.shown_triangles() as usize,
-            failure: None,
-            rays: Vec::new(),
-            paths: None,
+            ..SceneFigures::default()
         };
         let compared = self.fill(&mut figures);
         figures.failure = compared.as_ref().err().map(ToString::to_string);
