@@ -331,14 +331,11 @@ impl RenderArguments {
             bounds: *fog_box,
         });
         let of_scene = scene.medium.unwrap_or_default();
-        let cleared = *fog == Some(Vec3::ZERO) && fog_absorption.is_none();
+        let is_cleared = *fog == Some(Vec3::ZERO);
+        let absorption = if is_cleared { Vec3::ZERO } else { of_scene.absorption };
         Some(Medium {
             scattering: fog.map_or(of_scene.scattering, |_| asked.scattering),
-            absorption: match fog_absorption {
-                Some(_) => asked.absorption,
-                None if cleared => Vec3::ZERO,
-                None => of_scene.absorption,
-            },
+            absorption: fog_absorption.map_or(absorption, |_| asked.absorption),
             anisotropy: fog_anisotropy.unwrap_or(of_scene.anisotropy),
             bounds: asked.bounds.or(of_scene.bounds),
         })
