@@ -60,22 +60,15 @@ struct DeviceSettings {
 }
 
 impl DeviceSettings {
-    fn new(picture: &LinearPicture, settings: &DevelopSettings) -> Self {
-        let matrix = settings.white_balance.matrix();
-        let grade = settings.tone.grade.as_ref();
+    /// Those of a picture under the light that looks white, with nothing that is told of how it is developed.
+    fn balanced(picture: &LinearPicture, white_balance: WhiteBalance) -> Self {
+        let matrix = white_balance.matrix();
         Self {
             matrix: matrix.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]),
             size: picture.size(),
-            small_size: [0; 2],
-            gain: settings.exposure_ev.exp2(),
-            curve: settings.tone.curve as u32,
-            opacity: settings.opacity,
             is_balanced: (matrix != Mat3::IDENTITY).into(),
-            has_overlay: 0,
             unscale: picture.film.scale.recip(),
-            look_side: grade.map_or(0, |grade| grade.lut.side()),
-            look_strength: grade.map_or(0.0, |grade| grade.strength),
-            padding: [0; 3],
+            ..Self::zeroed()
         }
     }
 }
@@ -137,15 +130,9 @@ impl Developer {
     fn shrunk(&self, picture: &LinearPicture, white_balance: WhiteBalance) -> Result<Image> {
         let [all_width, all_height] = picture.size();
         let (width, height) = Image::shrunk_size(all_width, all_height, EXPOSURE_WIDTH);
-        let settings = DevelopSettings {
-            white_balance,
-            exposure_ev: 0.0,
-            tone: Tone::default(),
-            opacity: [0.0; 2],
-        };
         let settings = DeviceSettings {
             small_size: [width, height],
-            ..DeviceSettings::new(picture, &settings)
+            ..DeviceSettings::balanced(picture, white_balance)
         };
         let settings = stored(&self.gpu, &[settings]);
         let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
@@ -169,9 +156,17 @@ impl Developer {
         settings: &DevelopSettings,
         display: &DisplayTexture,
     ) {
-        let look = self.look_of(settings.tone.grade.as_ref().map(|grade| &grade.lut));
-        let has_overlay = overlay.is_some().into();
-        let settings = DeviceSettings { has_overlay, ..DeviceSettings::new(picture, settings) };
+        let grade = settings.tone.grade.as_ref();
+        let look = self.look_of(grade.map(|grade| &grade.lut));
+        let settings = DeviceSettings {
+            gain: settings.exposure_ev.exp2(),
+            curve: settings.tone.curve as u32,
+            opacity: settings.opacity,
+            has_overlay: overlay.is_some().into(),
+            look_side: grade.map_or(0, |grade| grade.lut.side()),
+            look_strength: grade.map_or(0.0, |grade| grade.strength),
+            ..DeviceSettings::balanced(picture, settings.white_balance)
+        };
         let settings = stored(&self.gpu, &[settings]);
         let OverlayTexture(overlay) = overlay.unwrap_or(&self.no_overlay);
         let textures = [(4, overlay), (5, &display.view)].map(|(binding, view)| {
