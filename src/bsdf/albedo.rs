@@ -87,16 +87,14 @@ struct RowPair {
 
 impl RowPair {
     fn of(roughness: f32) -> Self {
-        let x = roughness * (ROUGHNESSES - 1) as f32;
-        let row = (x as usize).min(ROUGHNESSES - 2);
-        Self { row: row as u32, fraction: x - row as f32 }
+        let (row, fraction) = split(roughness * (ROUGHNESSES - 1) as f32, ROUGHNESSES - 2);
+        Self { row: row as u32, fraction }
     }
 
     /// `(A, B)` at a cosine in `[0,1]`.
     fn at(self, cos: f32) -> Vec2 {
         let x = cos.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
-        let column = (x as usize).min(COSINES - 2);
-        let fraction = x - column as f32;
+        let (column, fraction) = split(x, COSINES - 2);
         let in_row = |row: &Row| row.terms[column].lerp(row.terms[column + 1], fraction);
         self.between(in_row)
     }
@@ -109,6 +107,13 @@ impl RowPair {
         let row = self.row as usize;
         of(&ROWS[row]).lerp(of(&ROWS[row + 1]), self.fraction)
     }
+}
+
+/// A place between two nodes of a table: whole part, at most `most`, and the rest.
+#[inline]
+pub(super) fn split(x: f32, most: usize) -> (usize, f32) {
+    let whole = (x as usize).min(most);
+    (whole, x - whole as f32)
 }
 
 /// The table as `shaders/albedo.wgsl` reads it: row by row the terms and their mean, each with those of

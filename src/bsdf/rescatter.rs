@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::SurfaceParameters;
-use super::albedo::AlbedoTerms;
+use super::albedo::{AlbedoTerms, split};
 use super::diffuse::cosine_hemisphere;
 use super::fresnel::{dielectric, reflect, refract};
 use super::interface::Interface;
@@ -210,12 +210,6 @@ fn glass_loss_at(eta: f32, roughness: f32, column: f32) -> f32 {
     let near = between(index * NODES + row, index * NODES + row + 1, row_rest);
     let next = between((index + 1) * NODES + row, (index + 1) * NODES + row + 1, row_rest);
     near + (next - near) * index_rest
-}
-
-/// Whole part, at most `most`, and the rest.
-fn split(x: f32, most: usize) -> (usize, f32) {
-    let whole = (x as usize).min(most);
-    (whole, x - whole as f32)
 }
 
 /// The row of [`LOSSES`] at a node of the relative index, and a roughness.

@@ -12,6 +12,7 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec3};
 
 use super::SurfaceParameters;
+use super::albedo::split;
 use crate::math::sin_cos_turns;
 
 pub(crate) const COSINES: usize = 32;
@@ -121,15 +122,12 @@ impl Sheen {
 
     /// What the lobe scatters towards this cosine of light 1 from everywhere; above 1 where it gains.
     fn gain(&self, cos: f32) -> f32 {
-        let y = self.roughness * (ROUGHNESSES - 1) as f32;
-        let row = (y as usize).min(ROUGHNESSES - 2);
+        let (row, down) = split(self.roughness * (ROUGHNESSES - 1) as f32, ROUGHNESSES - 2);
         let x = cos.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
-        let column = (x as usize).min(COSINES - 2);
-        let in_row = |row: &[f32; COSINES]| {
-            row[column] + (row[column + 1] - row[column]) * (x - column as f32)
-        };
+        let (column, across) = split(x, COSINES - 2);
+        let in_row = |row: &[f32; COSINES]| row[column] + (row[column + 1] - row[column]) * across;
         let (here, next) = (in_row(&ALBEDOS[row]), in_row(&ALBEDOS[row + 1]));
-        here + (next - here) * (y - row as f32)
+        here + (next - here) * down
     }
 
     fn is_outside(&self, z: f32) -> bool {
