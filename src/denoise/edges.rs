@@ -44,7 +44,11 @@ pub(super) fn mended(
     support: &[f32],
 ) -> Image {
     let size @ [width, height] = [guides.width, guides.height];
-    let radiance = |index| Radiance::of(guides, light, index);
+    let radiance = |index: usize| {
+        let albedo = guides.at(index).albedo;
+        let rgb = Vec3::from(light.rgb.each_ref().map(|plane| plane[index])) * albedo;
+        Radiance { rgb, variance: light.variance[index] * luminance(albedo).powi(2) }
+    };
     let pixels: Vec<Radiance> = (0..width * height).into_par_iter().map(radiance).collect();
     let filled = |index: usize| {
         if support[index] < MIN_ALIKE { regress(guides, &pixels, index) } else { pixels[index].rgb }
@@ -71,14 +75,6 @@ pub(super) fn mended(
 struct Radiance {
     rgb: Vec3,
     variance: f32,
-}
-
-impl Radiance {
-    fn of(guides: &Guides, light: &Light, index: usize) -> Self {
-        let albedo = guides.at(index).albedo;
-        let rgb = Vec3::from(light.rgb.each_ref().map(|plane| plane[index])) * albedo;
-        Self { rgb, variance: light.variance[index] * luminance(albedo).powi(2) }
-    }
 }
 
 /// What the pixels around one say it shows, blended with what it shows.
