@@ -189,7 +189,7 @@ pub fn write_picture(
         let picture = ExrPicture { image: &image, layers, metadata: &metadata, preview: None };
         return write_exr(path, picture);
     }
-    let image = balanced(options, films)?;
+    let mut image = balanced(options, films)?;
     let stops = options.exposure.of(film, &image);
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
     if options.white_balance != WhiteBalance::default() {
@@ -201,17 +201,15 @@ pub fn write_picture(
     if let Some(Grade { lut, strength }) = &options.tone.grade {
         metadata.push(("lightgrid.look".to_owned(), format!("{},{strength}", lut.name())));
     }
-    let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
-        return write_png(
-            path,
-            &display_rgb8(&image, stops, options.tone.clone()),
-            None,
-            &metadata,
-        );
-    };
-    let covered = display_rgb8(&divided(image, &alpha), stops, options.tone.clone());
+    let alpha = alpha_of(&film.without_gaps(), &metadata).unwrap_or_default();
+    // What surfaces show in pixels that they cover in part.
+    for (pixel, alpha) in image.pixels.iter_mut().zip(&alpha).filter(|(_, alpha)| **alpha > 0.0) {
+        *pixel = pixel.map(|radiance| radiance / alpha);
+    }
+    let levels = display_rgb8(&image, stops, options.tone.clone());
+    drop(image);
     let alpha: Vec<u8> = alpha.iter().map(|share| (255.0 * share).round() as u8).collect();
-    write_png(path, &covered, Some(&alpha), &metadata)
+    write_png(path, &levels, (!alpha.is_empty()).then_some(&alpha[..]), &metadata)
 }
 
 /// What takes the noise out, and what helps.
@@ -245,14 +243,6 @@ fn shown(options: &PictureOptions, films: Films<'_>) -> Result<Image> {
         (Some(filter), None) => filter.finish(films.film, films.cached),
         (None, _) => Ok(films.film.without_gaps().image()),
     }
-}
-
-/// What surfaces show in pixels that they cover in part.
-fn divided(mut image: Image, alpha: &[f32]) -> Image {
-    for (pixel, alpha) in image.pixels.iter_mut().zip(alpha).filter(|(_, alpha)| **alpha > 0.0) {
-        *pixel = pixel.map(|radiance| radiance / alpha);
-    }
-    image
 }
 
 /// The alpha channel of a picture that has nothing behind its surfaces, as its metadata says, if it has layers.
