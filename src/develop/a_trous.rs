@@ -84,14 +84,8 @@ impl Passes {
         };
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         let one = settings(1);
-        let entries = [
-            entry(0, &one),
-            entry(1, &film.sum),
-            entry(2, &film.counts),
-            entry(3, surfaces),
-            entry(4, &guides),
-            entry(5, &light),
-        ];
+        let inputs = [&one, &film.sum, &film.counts, surfaces, &guides, &light];
+        let entries: Vec<_> = (0..).zip(inputs).map(|(at, buffer)| entry(at, buffer)).collect();
         dispatch(gpu, &mut commands, undress, &entries, size);
         let entries = [entry(0, &one), entry(2, &film.counts), entry(4, &guides)];
         dispatch(gpu, &mut commands, survey, &entries, size);
