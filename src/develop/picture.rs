@@ -34,11 +34,8 @@ impl OverlayTexture {
     pub(super) fn new(gpu: &Gpu, size: [u32; 2], texels: &[[u8; 4]]) -> Self {
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
         let texture = texture(&gpu.device, Some("overlay"), size, FORMAT, usage);
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(4 * size[0]),
-            rows_per_image: None,
-        };
+        let bytes_per_row = Some(4 * size[0]);
+        let layout = wgpu::TexelCopyBufferLayout { bytes_per_row, ..Default::default() };
         let (place, texels) = (texture.as_image_copy(), bytemuck::cast_slice(texels));
         gpu.queue.write_texture(place, texels, layout, texture.size());
         Self(texture.create_view(&Default::default()))

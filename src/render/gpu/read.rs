@@ -29,22 +29,19 @@ impl Gpu {
     /// As [`Self::check`].
     pub(crate) fn read_texture(&self, texture: &wgpu::Texture) -> Result<Rgb8> {
         let (width, height) = (texture.width(), texture.height());
-        let bytes_per_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let bytes = u64::from(bytes_per_row) * u64::from(height);
+        let row_bytes = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(row_bytes) * u64::from(height);
         let staging = self.make(|_| self.staging(bytes))?;
         let mut commands = self.device.create_command_encoder(&Default::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(bytes_per_row),
-            rows_per_image: None,
-        };
+        let bytes_per_row = Some(row_bytes);
+        let layout = wgpu::TexelCopyBufferLayout { bytes_per_row, ..Default::default() };
         commands.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout },
             texture.size(),
         );
         let opaque = |bytes: &[u8]| {
-            let rows = bytes.chunks_exact(bytes_per_row as usize);
+            let rows = bytes.chunks_exact(row_bytes as usize);
             let texels = rows.flat_map(|row| row[..4 * width as usize].chunks_exact(4));
             texels.map(|texel| [texel[0], texel[1], texel[2]]).collect()
         };
