@@ -13,7 +13,7 @@ use crate::path::{Lit, PathLimits, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::UploadedScene;
-use crate::render::{Phase, Sampling, Session, View};
+use crate::render::{Driver, Sampling, Session, StopRule, View};
 use crate::scene::{Camera, Material, Texture, TextureImage, TextureRef, Wrap};
 
 /// [`Material::lambert`].
@@ -109,11 +109,9 @@ pub(super) fn session<'a>(setting: &Setting, lit: Lit<'a>, view: View) -> Result
 
 /// A session that has done its learning.
 pub(super) fn learned<'a>(setting: &Setting, lit: Lit<'a>, view: View) -> Result<Session<'a>> {
-    let mut session = session(setting, lit, view)?;
-    while session.phase() == Phase::Learning {
-        session.advance(0, &AtomicBool::new(false))?;
-    }
-    Ok(session)
+    let mut driver = Driver::new(session(setting, lit, view)?, StopRule::default());
+    driver.learn(&AtomicBool::new(false))?;
+    Ok(driver.session)
 }
 
 /// Learns if the view asks for it, then renders.
