@@ -426,14 +426,12 @@ pub(crate) fn light_words(lights: &LocalLights, globals: &mut Globals) -> Vec<u3
             }
             PunctualKind::Directional => (DIRECTIONAL_LIGHT, [0.0; 2]),
         };
-        let mut record = [0_u32; PUNCTUAL_WORDS];
-        record[0] = kind;
+        let end = words.len() + PUNCTUAL_WORDS;
+        words.push(kind);
         let vectors = [light.position, light.direction, light.intensity];
         let floats = vectors.iter().flat_map(Vec3::to_array).chain([light.range.min(f32::MAX)]);
-        for (word, value) in record[1..].iter_mut().zip(floats.chain(cosines)) {
-            *word = value.to_bits();
-        }
-        words.extend(record);
+        words.extend(floats.chain(cosines).map(f32::to_bits));
+        words.resize(end, 0);
     }
     globals.targets_at = words.len() as u32;
     if let Some(Aiming { targets, probability }) = aiming {
