@@ -142,6 +142,7 @@ impl Studio {
 
     fn wait_for_reference(&mut self, command: Command) -> Result<Arc<Reference>> {
         self.settle()?;
+        self.app.assets.set_reference(None, None);
         self.app.execute(command, &self.context);
         loop {
             self.frame()?;

@@ -12,7 +12,7 @@ use crate::render::film::{Film, Pixel};
 use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
 
-use super::worker::{Request, Snapshot};
+use super::worker::{Backdrop, Request, Snapshot};
 
 mod cache;
 mod cell_facts;
@@ -76,9 +76,8 @@ impl Sources<'_> {
     /// Of the film that most of the picture comes from.
     fn areas(&self) -> Painted {
         let own = &self.snapshot.main.film;
-        let cached = self.snapshot.backdrop.as_ref();
-        let cached = cached.filter(|cached| cached.samples > own.total_samples());
-        let film = cached.map_or(own, |cached| &cached.film);
+        let is_more = |cached: &&Backdrop| cached.samples > own.total_samples();
+        let film = self.snapshot.backdrop.as_ref().filter(is_more).map_or(own, |it| &it.film);
         let size = [film.width.div_ceil(AREA), film.height.div_ceil(AREA)];
         let of_area = |index: u32| error_of_area(film, [index % size[0], index / size[0]]);
         let errors: Vec<_> = (0..size[0] * size[1]).into_par_iter().map(of_area).collect();
