@@ -10,7 +10,9 @@ use crate::image::extension;
 use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
 use crate::scene::camera_path::FRAMES_PER_SECOND;
-use crate::scene::{Camera, LampEdit, Lamps, NamedLamp, Outlines, Scene, SceneOptions};
+use crate::scene::{
+    Camera, LampEdit, Lamps, NamedLamp, Outlines, Scene, SceneOptions, edit_of_lamp,
+};
 use crate::sources::{is_built_in_map, is_built_in_scene};
 use crate::tone::{Lut, ToneCurve, WhiteBalance};
 
@@ -233,9 +235,7 @@ fn of_file(
         add("material", Some(edit.to_text(&name)));
     }
     for lamp in lamps_by_name {
-        let edit = document.lamp_edits.get(&lamp.name).copied().unwrap_or_default();
-        let all = LampEdit { factor: document.lamps, ..LampEdit::default() };
-        let edit = edit.then(&all);
+        let edit = edit_of_lamp(&lamp.name, &document.lamp_edits, document.lamps);
         add("lamp", (edit != LampEdit::default()).then(|| edit.to_text(&lamp.name)));
     }
 }

@@ -57,7 +57,7 @@ impl LearningSteps {
         self.steps.len()
     }
 
-    /// Learning paths up to a step; `None` after the last: what is known by now.
+    /// Number of learning paths that a step knows; `None` beyond the last step.
     pub(super) fn paths(&self, step: usize) -> Option<u64> {
         self.steps.get(step).map(|step| step.paths)
     }

@@ -14,7 +14,7 @@ use crate::memory;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
 use crate::scene::needs::is_emitter;
-use crate::scene::{LampEdit, Material, NamedLamp, PunctualLight, SceneOptions, named_lamps};
+use crate::scene::{Material, NamedLamp, PunctualLight, SceneOptions, edit_of_lamp, named_lamps};
 use crate::sources;
 
 /// A scene ready for rays.
@@ -30,7 +30,7 @@ pub struct LoadedScene {
     pub materials: Arc<[Material]>,
     /// Its point, spot and directional lights without them.
     lights: Arc<[PunctualLight]>,
-    /// These, and materials that emit without or with changes.
+    /// These and the materials that emit, in the file or once changed, by name.
     pub named_lamps: Arc<[NamedLamp]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
@@ -58,12 +58,8 @@ impl LoadedScene {
                 *material = edit.apply(material);
             }
         }
-        let all = [&self.materials[..], &materials].concat();
-        let named_lamps = named_lamps(&self.lights, &all).into();
-        let edit = |name: &String| {
-            let own = changes.lamp_edits.get(name).copied().unwrap_or_default();
-            own.then(&LampEdit { factor: changes.lamps, ..LampEdit::default() })
-        };
+        let named_lamps = named_lamps(&self.lights, self.materials.iter().chain(&materials)).into();
+        let edit = |name: &str| edit_of_lamp(name, &changes.lamp_edits, changes.lamps);
         for material in materials.iter_mut().filter(|material| is_emitter(material)) {
             *material = edit(&material.name).apply_to_material(material);
         }
@@ -325,7 +321,7 @@ fn load_scene(name: &str, options: &SceneOptions, steps: &Steps) -> Result<Loade
     let kernel = KernelFacts::of_scene(&world);
     let materials: Arc<[Material]> = world.scene.materials.clone().into();
     let lights: Arc<[PunctualLight]> = world.scene.lights.clone().into();
-    let named_lamps = named_lamps(&lights, &materials).into();
+    let named_lamps = named_lamps(&lights, &materials[..]).into();
     let (name, changes) = (name.to_owned(), Document::default().changes());
     Ok(LoadedScene { name, world, changes, materials, lights, named_lamps, kernel, seconds })
 }

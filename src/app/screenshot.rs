@@ -89,7 +89,7 @@ impl Studio {
         self.app.interface = Interface { viewport_pixels, viewport_of, ..interface };
     }
 
-    /// Shows what was known after so many passes of learning.
+    /// Shows the distributions after the learning pass `step` in place of the present ones; 0 is before all passes.
     ///
     /// # Errors
     /// If a file cannot be read, or there are fewer passes.

@@ -28,7 +28,7 @@ impl Simd {
     }
 }
 
-/// Calls one of the walks by the instructions that there are and by whether there are instances.
+/// Calls the walk for the instructions of this processor, with or without instances.
 macro_rules! walk {
     ($walk:ident, $bvh:ident, $($argument:ident),+) => {{
         let Bvh { tree, simd } = $bvh;

@@ -98,7 +98,7 @@ pub(super) struct ScreenshotArguments {
     /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
     #[arg(long, value_parser = values::place, allow_hyphen_values = true, value_name = "X,Y")]
     inspect: Option<Vec2>,
-    /// Shows what was known after so many passes of learning in place of what is known by now; 0 is nothing.
+    /// Shows the distributions after learning pass N in place of the present ones; 0 is before all passes.
     #[arg(long, value_name = "N")]
     learning_step: Option<usize>,
     /// The material whose settings are shown, by its name.

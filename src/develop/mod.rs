@@ -60,7 +60,7 @@ struct DeviceSettings {
 }
 
 impl DeviceSettings {
-    /// Those of a picture under the light that looks white, with nothing that is told of how it is developed.
+    /// Size, scale and white balance of a picture; all other settings are zero.
     fn balanced(picture: &LinearPicture, white_balance: WhiteBalance) -> Self {
         let matrix = white_balance.matrix();
         Self {

@@ -83,7 +83,7 @@ impl LightChoice {
 impl LocalLights {
     /// Collects the chosen lights of a scene with bounds `(min, max)`.
     pub fn new(scene: &Scene, bounds: (Vec3, Vec3), choice: &LightChoice) -> Self {
-        let emission = choice.emission(&scene.materials);
+        let empty = Self { emission: choice.emission(&scene.materials), ..Self::default() };
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();
         let mut triangles = Vec::new();
         let mut lights = Vec::new();
@@ -91,9 +91,9 @@ impl LocalLights {
         let mut total = 0.0;
         // Instances share no lamps: the tree of lights holds places in the world.
         for triangle in scene.own_triangles() {
-            let material = scene.triangle_materials[triangle as usize] as usize;
-            let factor = emission.get(material).copied().unwrap_or(1.0);
-            if emits[material]
+            let material = scene.triangle_materials[triangle as usize];
+            let factor = empty.emission_of(material);
+            if emits[material as usize]
                 && let Some((moments, power)) = triangle_moments(scene, triangle, factor)
             {
                 lights.push(Light { index: triangles.len() as u32, moments });
@@ -117,11 +117,11 @@ impl LocalLights {
         }
         let everything = total + distant.iter().map(|(_, power)| power).sum::<f64>();
         if !(everything > 0.0 && everything.is_finite()) {
-            return Self { punctual, emission, ..Self::default() };
+            return Self { punctual, ..empty };
         }
         relate(&mut lights);
         let tree = LightTree::new(lights, total, &distant, triangles.len());
-        Self { triangles, punctual, tree, aiming: None, emission }
+        Self { triangles, punctual, tree, ..empty }
     }
 
     /// Whether there is nothing to sample.

@@ -70,7 +70,7 @@ struct Faces<'a> {
 }
 
 impl Faces<'_> {
-    /// All faces of so many triangles.
+    /// Triangles of each face that has `COUNT` of them, without those that are backed.
     fn of<const COUNT: usize>(&self, is_backed: &[bool]) -> Vec<Range<usize>> {
         let is_left = |at: usize| !is_backed[at] && self.may_pair(at);
         let is_face = |face: &Range<usize>| {

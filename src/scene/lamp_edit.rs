@@ -27,19 +27,22 @@ with_defaults! {
     }
 }
 
-/// Lights of one name: point, spot and directional ones, and materials that emit.
+/// The lights and the materials that emit of one name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedLamp {
-    /// Theirs.
+    /// Their name.
     pub name: String,
-    /// Linear RGB of the first, the largest of which is 1.
+    /// Linear RGB of the first of them; the largest component is 1.
     pub color: Vec3,
 }
 
-/// A lamp for each name that there is among lights and materials that emit.
-pub fn named_lamps(lights: &[PunctualLight], materials: &[Material]) -> Vec<NamedLamp> {
+/// A lamp for each name among lights and materials that emit.
+pub fn named_lamps<'m>(
+    lights: &[PunctualLight],
+    materials: impl IntoIterator<Item = &'m Material>,
+) -> Vec<NamedLamp> {
     let of_lights = lights.iter().map(|light| (&light.name, light.intensity));
-    let emitters = materials.iter().filter(|material| is_emitter(material));
+    let emitters = materials.into_iter().filter(|material| is_emitter(material));
     let all = of_lights.chain(emitters.map(|material| (&material.name, material.emissive)));
     let mut names = HashSet::new();
     let first_of_name = all.filter(|(name, _)| names.insert(*name));
@@ -48,6 +51,12 @@ pub fn named_lamps(lights: &[PunctualLight], materials: &[Material]) -> Vec<Name
         NamedLamp { name: name.clone(), color }
     };
     first_of_name.map(lamp).collect()
+}
+
+/// The change to a lamp: its own, and a factor on all lamps.
+pub fn edit_of_lamp(name: &str, edits: &LampEdits, all: f32) -> LampEdit {
+    let own = edits.get(name).copied().unwrap_or_default();
+    own.then(&LampEdit { factor: all, ..LampEdit::default() })
 }
 
 impl LampEdit {

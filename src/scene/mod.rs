@@ -29,7 +29,7 @@ pub use contents::Scene;
 pub use frame::Frame;
 pub(crate) use frame::in_digits;
 pub use instances::{Instance, Instances, MAX_SHOWN};
-pub use lamp_edit::{LampEdit, LampEdits, NamedLamp, named_lamps};
+pub use lamp_edit::{LampEdit, LampEdits, NamedLamp, edit_of_lamp, named_lamps};
 pub use light::{PunctualKind, PunctualLight};
 pub(crate) use material::MAX_POLISH_ROUGHNESS;
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};

@@ -72,7 +72,7 @@ const MAX_METHODS: usize = 40;
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 37] = [
     ("alarm", 48),
-    ("app", 12227),
+    ("app", 12221),
     ("bench", 441),
     ("bsdf", 1446),
     ("bvh", 1339),
@@ -101,7 +101,7 @@ const BUDGETS: [(&str, usize); 37] = [
     ("render", 6450),
     ("report", 2791),
     ("sampler", 170),
-    ("scene", 9512),
+    ("scene", 9519),
     ("shaders", 6353),
     ("sources", 137),
     ("stability", 1716),

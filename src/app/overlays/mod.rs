@@ -7,7 +7,7 @@ use crate::environment::sun::Sun;
 use crate::image::Image;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
-use crate::metrics::flip;
+use crate::metrics::{BLOCK, flip};
 use crate::render::film::{Film, Pixel};
 use crate::render::sun_placement::is_sunlit;
 use crate::render::surface_map::{Spot, SurfaceMap};
@@ -28,8 +28,6 @@ pub use painted::Legend;
 pub(super) use painted::Painted;
 use painted::{Range, scaled};
 
-/// Sides of the areas whose error is shown, in pixels.
-const AREA: u32 = 8;
 /// FLIP at the bright end of its scale.
 const MAX_FLIP: f32 = 0.5;
 
@@ -78,11 +76,11 @@ impl Sources<'_> {
         let own = &self.snapshot.main.film;
         let is_more = |cached: &&Backdrop| cached.samples > own.total_samples();
         let film = self.snapshot.backdrop.as_ref().filter(is_more).map_or(own, |it| &it.film);
-        let size = [film.width.div_ceil(AREA), film.height.div_ceil(AREA)];
+        let size = [film.width.div_ceil(BLOCK), film.height.div_ceil(BLOCK)];
         let of_area = |index: u32| error_of_area(film, [index % size[0], index / size[0]]);
         let errors: Vec<_> = (0..size[0] * size[1]).into_par_iter().map(of_area).collect();
         let places = (0..film.height).flat_map(|y| (0..film.width).map(move |x| [x, y]));
-        let of_place = |[x, y]: [u32; 2]| errors[(y / AREA * size[0] + x / AREA) as usize];
+        let of_place = |[x, y]: [u32; 2]| errors[(y / BLOCK * size[0] + x / BLOCK) as usize];
         scaled(places.map(of_place), Range::Logarithmic, "of the luminance")
     }
 
@@ -200,8 +198,8 @@ fn relative_error(pixel: &Pixel) -> Option<f32> {
 
 /// Standard error over luminance of the mean of an area, by its number of column and row.
 fn error_of_area(film: &Film, [column, row]: [u32; 2]) -> Option<f32> {
-    let columns = column * AREA..((column + 1) * AREA).min(film.width);
-    let rows = row * AREA..((row + 1) * AREA).min(film.height);
+    let columns = column * BLOCK..((column + 1) * BLOCK).min(film.width);
+    let rows = row * BLOCK..((row + 1) * BLOCK).min(film.height);
     let row = |y: u32| {
         let place = |x: u32| (y * film.width + x) as usize;
         &film.pixels()[place(columns.start)..place(columns.end)]

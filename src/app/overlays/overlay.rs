@@ -15,22 +15,22 @@ macro_rules! overlays {
 
             /// Its name on the command line.
             pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => $word),+
-                }
+                self.words()[0]
             }
 
             /// What to call it.
             pub fn title(self) -> &'static str {
-                match self {
-                    $(Self::$name => $title),+
-                }
+                self.words()[1]
             }
 
             /// What it shows, in a sentence.
             pub fn description(self) -> &'static str {
+                self.words()[2]
+            }
+
+            fn words(self) -> [&'static str; 3] {
                 match self {
-                    $(Self::$name => $description),+
+                    $(Self::$name => [$word, $title, $description]),+
                 }
             }
         }
